@@ -1,0 +1,3 @@
+//! The sharp command.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Option guides: guide paths and pseudo-rewards.

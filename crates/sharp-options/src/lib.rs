@@ -1,0 +1,1 @@
+//! Option endpoints: centroid and interface options.

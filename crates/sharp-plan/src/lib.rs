@@ -1,0 +1,1 @@
+//! Algorithm 1: search, learning, composed policy, library.

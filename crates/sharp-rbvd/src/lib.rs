@@ -1,0 +1,1 @@
+//! Region-based Voronoi diagram.

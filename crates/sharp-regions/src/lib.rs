@@ -1,0 +1,1 @@
+//! Critical regions: labels, network, prediction.

@@ -1,0 +1,1 @@
+//! Stochastic simulator of wheeled robots.

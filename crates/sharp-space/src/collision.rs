@@ -1,0 +1,206 @@
+//! The collision function f : X → {0, 1} of the paper, turned around: where the robot may stand.
+
+use crate::distance_field::DistanceField;
+use crate::footprint::Footprint;
+use crate::grid::{GridFrame, OccupancyGrid};
+use crate::pose::Pose;
+
+/// Decides where the robot may stand. Implement [`is_free`](Self::is_free); the rest follows.
+pub trait CollisionChecker {
+    /// Returns true if the footprint at `pose` lies inside the map and touches no blocked cell.
+    fn is_free(&self, pose: Pose) -> bool;
+
+    /// Returns true if poses at most `step_m` metres apart from `from` to `to` are free, ends included.
+    ///
+    /// Headings turn the short way in step with the position; a turn in place is sampled as if the
+    /// outline were a metre away, so that no corner moves more than `step_m` per metre of reach.
+    fn is_segment_free(&self, from: Pose, to: Pose, step_m: f64) -> bool {
+        let length = from.distance_m(&to).max(from.heading.turn_to(to.heading).abs());
+        let steps = (length / step_m).ceil().max(1.0) as usize;
+        (0..=steps).all(|i| self.is_free(from.interpolate(&to, i as f64 / steps as f64)))
+    }
+}
+
+impl<C: CollisionChecker + ?Sized> CollisionChecker for &C {
+    fn is_free(&self, pose: Pose) -> bool {
+        (**self).is_free(pose)
+    }
+}
+
+/// Exact test of a rectangle against the blocked cells of a grid.
+///
+/// A distance field settles the clear cases; between the inscribed and the circumscribed radius
+/// the rectangle is cut into grid rows, and a running count of blocked cells answers each row at
+/// once. A rectangle that only touches a cell's side counts as free.
+#[derive(Clone, Debug)]
+pub struct FootprintChecker {
+    footprint: Footprint,
+    field: DistanceField,
+    /// `width + 1` counts a row: blocked cells left of each column border.
+    blocked_before: Vec<u32>,
+}
+
+impl FootprintChecker {
+    /// A checker for `footprint` among everything in `grid` that is not free.
+    #[must_use]
+    pub fn new(grid: &OccupancyGrid, footprint: Footprint) -> Self {
+        let frame = grid.frame();
+        let mut blocked_before = Vec::with_capacity((frame.width + 1) * frame.height);
+        for row in grid.cells().chunks_exact(frame.width) {
+            let mut count = 0;
+            blocked_before.push(count);
+            for &cell in row {
+                count += u32::from(cell != crate::Occupancy::Free);
+                blocked_before.push(count);
+            }
+        }
+        Self { footprint, field: DistanceField::new(grid), blocked_before }
+    }
+
+    /// The outline it tests.
+    #[must_use]
+    pub const fn footprint(&self) -> &Footprint {
+        &self.footprint
+    }
+
+    /// The distance field of the grid it tests against.
+    #[must_use]
+    pub const fn field(&self) -> &DistanceField {
+        &self.field
+    }
+
+    /// The exact test alone, without the distance field's short cuts.
+    #[must_use]
+    pub fn is_free_exact(&self, pose: Pose) -> bool {
+        let frame = self.field.frame();
+        let corners = self.footprint.corners(&pose).map(|corner| frame.to_grid(corner));
+        let (width, height) = (frame.width as f64, frame.height as f64);
+        let inside = |c: &crate::Vector| c.x >= 0.0 && c.y >= 0.0 && c.x <= width && c.y <= height;
+        if !corners.iter().all(inside) {
+            return false;
+        }
+        let low = corners.iter().map(|c| c.y).fold(f64::INFINITY, f64::min);
+        let high = corners.iter().map(|c| c.y).fold(f64::NEG_INFINITY, f64::max);
+        let (first, last) = (low as usize, (high.ceil() as usize).min(frame.height));
+        (first..last).all(|row| {
+            let (left, right) = span_in_strip(&corners, row as f64, row as f64 + 1.0);
+            self.is_span_free(frame, row, left, right)
+        })
+    }
+
+    fn is_span_free(&self, frame: &GridFrame, row: usize, left: f64, right: f64) -> bool {
+        if left >= right {
+            return true;
+        }
+        let (from, to) = (left.max(0.0) as usize, (right.ceil() as usize).min(frame.width));
+        let counts = &self.blocked_before[row * (frame.width + 1)..(row + 1) * (frame.width + 1)];
+        counts[to] == counts[from]
+    }
+}
+
+impl CollisionChecker for FootprintChecker {
+    fn is_free(&self, pose: Pose) -> bool {
+        let frame = self.field.frame();
+        let Some(cell) = frame.cell_at(pose.position) else { return false };
+        let distance = self.field.at(cell);
+        // The pose is at most half a diagonal from the cell's centre, the blocked cell's nearest
+        // point at most half a diagonal from its centre.
+        let half_diagonal = std::f64::consts::FRAC_1_SQRT_2 * frame.resolution_m;
+        if distance - 2.0 * half_diagonal > self.footprint.circumscribed_radius_m() {
+            return true;
+        }
+        if distance + half_diagonal < self.footprint.inscribed_radius_m() {
+            return false;
+        }
+        self.is_free_exact(pose)
+    }
+}
+
+/// The x extent of a convex polygon inside the strip `y0..y1`; empty as `(∞, −∞)`.
+fn span_in_strip(corners: &[crate::Vector; 4], y0: f64, y1: f64) -> (f64, f64) {
+    let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut include = |x: f64| {
+        left = left.min(x);
+        right = right.max(x);
+    };
+    for (i, a) in corners.iter().enumerate() {
+        let b = &corners[(i + 1) % 4];
+        if (y0..=y1).contains(&a.y) {
+            include(a.x);
+        }
+        for y in [y0, y1] {
+            if (a.y - y) * (b.y - y) < 0.0 {
+                include(a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y));
+            }
+        }
+    }
+    (left, right)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn room() -> FootprintChecker {
+        let grid = OccupancyGrid::from_ascii(
+            0.5,
+            "
+            ##########
+            #........#
+            #........#
+            ####.#####
+            #........#
+            ##########",
+        )
+        .unwrap();
+        FootprintChecker::new(&grid, Footprint::rectangle(0.6, 0.2).unwrap())
+    }
+
+    #[test]
+    fn a_long_robot_passes_a_door_only_straight() {
+        let checker = room();
+        let door = |heading| checker.is_free(Pose::new(2.25, 1.25, heading));
+        assert!(door(std::f64::consts::FRAC_PI_2), "straight through");
+        assert!(!door(0.0), "sideways");
+        assert!(!door(1.1), "askew");
+    }
+
+    #[test]
+    fn short_cuts_agree_with_the_exact_test() {
+        let checker = room();
+        arbtest::arbtest(|u| {
+            let mut coordinate =
+                |max: f64| u.int_in_range(0..=100_000_u32).map(|i| f64::from(i) / 100_000.0 * max);
+            let pose = Pose::new(coordinate(6.0)? - 0.5, coordinate(4.0)? - 0.5, coordinate(6.3)?);
+            assert_eq!(checker.is_free(pose), checker.is_free_exact(pose), "{pose:?}");
+            Ok(())
+        });
+    }
+
+    #[test]
+    fn the_exact_test_agrees_with_dense_sampling() {
+        let checker = room();
+        let grid_free = |pose: Pose| {
+            // A lattice of points 1 cm apart over the rectangle, border shrunk by a hair.
+            (-59..=59).all(|i| {
+                (-19..=19).all(|j| {
+                    let point = pose.to_world(crate::Vector::new(f64::from(i) * 0.01, f64::from(j) * 0.01));
+                    checker.field.frame().cell_at(point).is_some_and(|cell| checker.field.at(cell) > 0.0)
+                })
+            })
+        };
+        for i in 0..400 {
+            let t = f64::from(i);
+            let pose = Pose::new(0.5 + (t * 0.618).fract() * 4.0, 0.5 + (t * 0.414).fract() * 2.0, t * 0.37);
+            if checker.is_free(pose) {
+                assert!(grid_free(pose), "{pose:?} was called free");
+            }
+        }
+    }
+
+    #[test]
+    fn leaving_the_map_is_a_collision() {
+        assert!(!room().is_free(Pose::new(-1.0, 1.0, 0.0)), "outside");
+        assert!(!room().is_free(Pose::new(f64::NAN, 1.0, 0.0)), "NaN");
+    }
+}

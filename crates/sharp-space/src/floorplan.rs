@@ -1,0 +1,1 @@
+//! Seeded generator of indoor maps for training, tests and benches.

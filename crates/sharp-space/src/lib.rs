@@ -1,0 +1,36 @@
+//! What is true of the configuration space before anything moves.
+//!
+//! The nouns that every other crate shares: a [`Pose`] in SE(2), an [`OccupancyGrid`] and its
+//! [`DistanceField`], a robot's [`Footprint`], the collision function as the trait
+//! [`CollisionChecker`], a critical [`Region`], and the named random streams of a [`Seed`].
+//! Nothing here knows dynamics, learning or files.
+//!
+//! ```
+//! use sharp_space::{CollisionChecker, Footprint, FootprintChecker, OccupancyGrid, Pose};
+//!
+//! let grid = OccupancyGrid::from_ascii(1.0, "#####\n#...#\n#####").unwrap();
+//! let checker = FootprintChecker::new(&grid, Footprint::rectangle(0.8, 0.4).unwrap());
+//! assert!(checker.is_free(Pose::new(2.5, 1.5, 0.0)));
+//! assert!(!checker.is_free(Pose::new(2.5, 1.5, 1.57)), "too long to stand across the corridor");
+//! ```
+
+mod ascii;
+mod bounds;
+mod collision;
+mod distance_field;
+mod footprint;
+mod grid;
+mod pose;
+mod region;
+mod seed;
+
+pub mod floorplan;
+
+pub use bounds::Bounds;
+pub use collision::{CollisionChecker, FootprintChecker};
+pub use distance_field::DistanceField;
+pub use footprint::{Footprint, FootprintError};
+pub use grid::{Cell, GridError, GridFrame, Occupancy, OccupancyGrid};
+pub use pose::{Heading, Point, Pose, Vector, wrap_angle};
+pub use region::{Region, RegionId};
+pub use seed::{Seed, Stream};
