@@ -1,3 +1,5 @@
-//! The sharp command.
+//! The sharp command: from a map to a policy.
+
+mod render;
 
 fn main() {}

@@ -1,0 +1,1 @@
+//! Pictures of maps, abstractions, plans and drives.
