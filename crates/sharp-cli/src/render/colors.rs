@@ -45,7 +45,8 @@ pub(super) fn color_states(frame: &GridFrame, states: &[Option<u32>]) -> BTreeMa
     let mut colors = BTreeMap::new();
     let mut uses = [0_usize; STATES.len()];
     for state in order {
-        let clashes = |color: usize| neighbors[&state].iter().filter(|n| colors.get(*n) == Some(&color)).count();
+        let clashes =
+            |color: usize| neighbors[&state].iter().filter(|n| colors.get(*n) == Some(&color)).count();
         let color = (0..STATES.len()).min_by_key(|&c| (clashes(c), uses[c], c)).unwrap_or(0);
         uses[color] += 1;
         colors.insert(state, color);
@@ -94,8 +95,9 @@ mod tests {
         arbtest::arbtest(|u| {
             let frame = frame(6, 6);
             // At most nine states, so a state has at most eight neighbours and twelve colours do.
-            let states: Vec<Option<u32>> =
-                (0..36).map(|_| Ok(u.int_in_range(0..=9)?).map(|s: u32| s.checked_sub(1))).collect::<Result<_, _>>()?;
+            let states: Vec<Option<u32>> = (0..36)
+                .map(|_| Ok(u.int_in_range(0..=9)?).map(|s: u32| s.checked_sub(1)))
+                .collect::<Result<_, _>>()?;
             let colors = color_states(&frame, &states);
             for (state, near) in neighbors(&frame, &states) {
                 for other in near {

@@ -58,7 +58,8 @@ fn trace_loop(edges: &mut [u8], stride: usize, start: usize, path: &mut String) 
         at = at.wrapping_add_signed(dy * stride as isize + dx);
         run += 1;
         // Turning right first keeps cells that share only a corner apart.
-        let next = [1, 0, 3].map(|turn| (direction + turn) % 4).into_iter().find(|d| edges[at] & (1 << d) != 0);
+        let next =
+            [1, 0, 3].map(|turn| (direction + turn) % 4).into_iter().find(|d| edges[at] & (1 << d) != 0);
         let Some(next) = next else { break };
         if next != direction {
             let signed = if dx + dy > 0 { "" } else { "-" };

@@ -3,7 +3,9 @@
 //! User units of the SVG are cells with y downwards; line widths are thousandths of the longer
 //! side, so that a small room and an office floor look alike.
 
-use sharp_space::{Cell, Footprint, GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Region, Vector};
+use sharp_space::{
+    Cell, Footprint, GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Region, Vector,
+};
 
 use super::colors::{STATES, color_states, ramp};
 use super::digits;
@@ -12,6 +14,8 @@ use super::svg::{PathData, Svg, number};
 
 /// Width or height of the SVG as shown, pixels, whichever is longer.
 const SIDE_PX: f64 = 1000.0;
+/// Margin of unknown land kept around the known cells, as a share of their longer side.
+const MARGIN: f64 = 0.02;
 /// Blocks along the longer side of a heat map: finer detail than two pixels is not worth bytes.
 const HEAT_BLOCKS: usize = 500;
 /// Steps of the heat map's ramp.
@@ -23,7 +27,7 @@ const FREE: &str = "#fcfcfb";
 const UNKNOWN: &str = "#c3c6cb";
 const WALL: &str = "#2b2f36";
 const INK: &str = "#30343b";
-const GUIDE: &str = "#1f5fbf";
+const GUIDE: &str = "#2f74d0";
 const DRIVE: &str = "#0b7a4b";
 const FAILURE: &str = "#d0202a";
 const START: &str = "#12a150";
@@ -42,6 +46,7 @@ pub(crate) struct Drive {
 #[derive(Debug)]
 pub(crate) struct Scene<'a> {
     grid: &'a OccupancyGrid,
+    view: View,
     heat: Option<&'a [f32]>,
     states: Option<Vec<Option<u32>>>,
     is_faded: bool,
@@ -57,10 +62,11 @@ pub(crate) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// The bare map.
+    /// The bare map, cut to what is known of it.
     pub(crate) fn new(grid: &'a OccupancyGrid) -> Self {
         Self {
             grid,
+            view: View::of_known(grid),
             heat: None,
             states: None,
             is_faded: false,
@@ -147,10 +153,12 @@ impl<'a> Scene<'a> {
 
     /// The picture as an SVG document; equal scenes give equal bytes.
     pub(crate) fn to_svg(&self) -> String {
-        let frame = self.grid.frame();
-        let (width, height) = (frame.width as f64, frame.height as f64);
-        let mut svg = Svg::new(width, height, SIDE_PX * (width / height).min(1.0));
-        svg.element("path", &[("d", format!("M0 0h{width}v{height}h-{width}z")), ("fill", FREE.into())]);
+        let View { left, top, width, height } = self.view;
+        let mut svg = Svg::new([left, top, width, height].map(|n| n as f64), SIDE_PX);
+        svg.element(
+            "path",
+            &[("d", format!("M{left} {top}h{width}v{height}h-{width}z")), ("fill", FREE.into())],
+        );
         self.draw_heat(&mut svg);
         self.draw_states(&mut svg);
         self.draw_regions(&mut svg);
@@ -192,12 +200,15 @@ impl<'a> Scene<'a> {
             let d = outline_of(frame, |index| colors[index] == Some(color));
             if !d.is_empty() {
                 // A rim of the same colour closes the hairline that antialiasing leaves between neighbours.
-                svg.element("path", &[
-                    ("d", d),
-                    ("fill", (*fill).into()),
-                    ("stroke", (*fill).into()),
-                    ("stroke-width", "0.7".into()),
-                ]);
+                svg.element(
+                    "path",
+                    &[
+                        ("d", d),
+                        ("fill", (*fill).into()),
+                        ("stroke", (*fill).into()),
+                        ("stroke-width", "0.7".into()),
+                    ],
+                );
             }
         }
         svg.close();
@@ -212,15 +223,18 @@ impl<'a> Scene<'a> {
         for cell in self.regions.iter().flat_map(|region| &region.cells) {
             is_member[frame.index(*cell)] = true;
         }
-        svg.element("path", &[
-            ("d", outline_of(frame, |index| is_member[index])),
-            ("fill", "#ffffff".into()),
-            ("fill-opacity", if self.heat.is_some() { "0" } else { "0.45" }.into()),
-            ("stroke", if self.heat.is_some() { "#ffffff" } else { INK }.into()),
-            ("stroke-width", self.px(1.2)),
-            ("stroke-linejoin", "round".into()),
-            ("stroke-opacity", if self.is_faded { "0.4" } else { "1" }.into()),
-        ]);
+        svg.element(
+            "path",
+            &[
+                ("d", outline_of(frame, |index| is_member[index])),
+                ("fill", "#ffffff".into()),
+                ("fill-opacity", if self.heat.is_some() { "0" } else { "0.45" }.into()),
+                ("stroke", if self.heat.is_some() { "#ffffff" } else { INK }.into()),
+                ("stroke-width", self.px(1.2)),
+                ("stroke-linejoin", "round".into()),
+                ("stroke-opacity", if self.is_faded { "0.4" } else { "1" }.into()),
+            ],
+        );
     }
 
     fn draw_blocked(&self, svg: &mut Svg) {
@@ -268,12 +282,15 @@ impl<'a> Scene<'a> {
         if self.endpoints.is_empty() {
             return;
         }
-        svg.open("g", &[
-            ("fill", "#ffffff".into()),
-            ("fill-opacity", "0.9".into()),
-            ("stroke", INK.into()),
-            ("stroke-width", self.px(1.2)),
-        ]);
+        svg.open(
+            "g",
+            &[
+                ("fill", "#ffffff".into()),
+                ("stroke", INK.into()),
+                ("stroke-width", self.px(1.2)),
+                ("opacity", if self.is_faded { "0.6" } else { "0.95" }.into()),
+            ],
+        );
         for center in self.endpoints {
             self.circle(svg, *center, self.endpoint_radius());
         }
@@ -296,13 +313,14 @@ impl<'a> Scene<'a> {
     fn draw_guides(&self, svg: &mut Svg) {
         for guide in self.guides {
             let path = PathData::polyline(guide.iter().map(|point| self.xy(*point)));
-            self.line(svg, path, GUIDE, 3.5);
+            self.line(svg, path, GUIDE, 3.0);
         }
     }
 
     fn draw_drives(&self, svg: &mut Svg) {
-        let (failed, reached): (Vec<&Drive>, Vec<&Drive>) = self.drives.iter().partition(|drive| drive.failed);
-        let opacity = |count: usize| number((4.0 / count.max(1) as f64).clamp(0.3, 0.9));
+        let (failed, reached): (Vec<&Drive>, Vec<&Drive>) =
+            self.drives.iter().partition(|drive| drive.failed);
+        let opacity = |count: usize| number((4.0 / count.max(1) as f64).clamp(0.4, 0.9));
         for (drives, color) in [(&reached, DRIVE), (&failed, FAILURE)] {
             svg.open("g", &[("opacity", opacity(drives.len()))]);
             for drive in drives {
@@ -341,11 +359,10 @@ impl<'a> Scene<'a> {
         for (color, width) in [(INK, 5.0), ("#ffffff", 2.0)] {
             self.line(svg, PathData::polyline([self.xy(start.position), tip]), color, width);
         }
-        svg.open("g", &[
-            ("stroke", INK.into()),
-            ("stroke-width", self.px(1.5)),
-            ("stroke-linejoin", "round".into()),
-        ]);
+        svg.open(
+            "g",
+            &[("stroke", INK.into()), ("stroke-width", self.px(1.5)), ("stroke-linejoin", "round".into())],
+        );
         svg.open("g", &[("fill", START.into())]);
         self.circle(svg, start.position, 8.0 * unit);
         svg.close();
@@ -355,10 +372,7 @@ impl<'a> Scene<'a> {
             let angle = std::f64::consts::PI * f64::from(i) / 5.0;
             [x + radius * angle.sin(), y - radius * angle.cos()]
         });
-        svg.element("path", &[
-            ("d", PathData::polyline(star).close().finish()),
-            ("fill", GOAL.into()),
-        ]);
+        svg.element("path", &[("d", PathData::polyline(star).close().finish()), ("fill", GOAL.into())]);
         svg.close();
     }
 
@@ -384,8 +398,7 @@ impl<'a> Scene<'a> {
 
     /// The length of one pixel of the shown picture in cells.
     fn unit(&self) -> f64 {
-        let frame = self.grid.frame();
-        frame.width.max(frame.height) as f64 / SIDE_PX
+        self.view.width.max(self.view.height) as f64 / SIDE_PX
     }
 
     fn px(&self, length_px: f64) -> String {
@@ -413,6 +426,35 @@ impl<'a> Scene<'a> {
         let frame = self.grid.frame();
         let heading = Heading::new(pose.heading.radians()).unit() * (length * frame.resolution_m);
         self.xy(pose.position + heading)
+    }
+}
+
+/// The part of the map that the picture shows, in cells with line 0 at the top.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct View {
+    left: usize,
+    top: usize,
+    width: usize,
+    height: usize,
+}
+
+impl View {
+    /// The rectangle around all known cells with a margin; everything if nothing is known.
+    fn of_known(grid: &OccupancyGrid) -> Self {
+        let frame = grid.frame();
+        let known = (0..frame.len()).filter(|&index| grid.cells()[index] != Occupancy::Unknown);
+        let (mut low, mut high) = ((frame.width, frame.height), (0, 0));
+        for Cell { col, row } in known.map(|index| frame.cell(index)) {
+            low = (low.0.min(col), low.1.min(row));
+            high = (high.0.max(col + 1), high.1.max(row + 1));
+        }
+        if high == (0, 0) {
+            return Self { left: 0, top: 0, width: frame.width, height: frame.height };
+        }
+        let margin = ((high.0 - low.0).max(high.1 - low.1) as f64 * MARGIN).ceil() as usize;
+        let (left, bottom) = (low.0.saturating_sub(margin), low.1.saturating_sub(margin));
+        let (right, top) = ((high.0 + margin).min(frame.width), (high.1 + margin).min(frame.height));
+        Self { left, top: frame.height - top, width: right - left, height: top - bottom }
     }
 }
 
@@ -470,6 +512,123 @@ const fn xy(vector: Vector) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
+    use sharp_space::{DistanceField, RegionId};
+
     use super::*;
     use crate::render::svg_to_png;
+
+    fn rooms() -> OccupancyGrid {
+        OccupancyGrid::from_ascii(
+            0.5,
+            "
+            ###########
+            #....#....#
+            #.........#
+            #....#....#
+            #....#.####
+            ###########",
+        )
+        .unwrap()
+    }
+
+    /// A picture with every layer of an abstraction or of a drive.
+    fn picture(is_drive: bool) -> String {
+        let grid = rooms();
+        let field = DistanceField::new(&grid);
+        let region = Region::new(RegionId(0), vec![Cell::new(5, 3), Cell::new(6, 3)], &field).unwrap();
+        let regions = [region];
+        let (left, right) = (Point::new(1.5, 1.5), Point::new(4.0, 2.0));
+        let pose = |point| Pose::at(point, Heading::new(0.4));
+        let drives = [false, true].map(|failed| Drive { poses: vec![pose(left), pose(right)], failed });
+        let (endpoints, labels, options) = ([left, right], [(0, left), (17, right)], [(left, right)]);
+        let guides = [vec![left, right]];
+        let scene = Scene::new(&grid).states(&|cell| Some(u32::from(cell.col > 5))).regions(&regions);
+        if is_drive {
+            let footprint = Footprint::rectangle(0.4, 0.3).unwrap();
+            scene.faded().guides(&guides).drives(&drives, footprint).problem(pose(left), pose(right)).to_svg()
+        } else {
+            scene.options(&options).endpoints(&endpoints, 0.4).labels(&labels).to_svg()
+        }
+    }
+
+    /// The colour of the middle of the cell in column `col` and line `line` from the top.
+    fn pixel(svg: &str, grid: &OccupancyGrid, col: u32, line: u32) -> String {
+        let scale = 20;
+        let side = grid.frame().width.max(grid.frame().height) as u32 * scale;
+        let image = image::load_from_memory(&svg_to_png(svg, side).unwrap()).unwrap().to_rgb8();
+        let [r, g, b] = image.get_pixel(col * scale + scale / 2, line * scale + scale / 2).0;
+        format!("#{r:02x}{g:02x}{b:02x}")
+    }
+
+    #[test]
+    fn row_zero_is_at_the_bottom() {
+        let grid = OccupancyGrid::from_ascii(1.0, "#..\n..?").unwrap();
+        let svg = Scene::new(&grid).to_svg();
+        for (col, line, color) in [(0, 0, WALL), (1, 0, FREE), (0, 1, FREE), (2, 1, UNKNOWN)] {
+            assert_eq!(pixel(&svg, &grid, col, line), color, "column {col}, line {line}");
+        }
+    }
+
+    #[test]
+    fn world_points_follow_the_frame() {
+        let frame = GridFrame {
+            origin: Pose::new(10.0, -4.0, std::f64::consts::FRAC_PI_2),
+            resolution_m: 0.5,
+            width: 4,
+            height: 2,
+        };
+        let grid = OccupancyGrid::new(frame, vec![Occupancy::Free; 8]).unwrap();
+        let svg = Scene::new(&grid).endpoints(&[frame.center(Cell::new(3, 0))], 0.2).to_svg();
+        assert!(svg.contains(r#"<circle cx="3.5" cy="1.5" r="0.4"/>"#), "lower right cell: {svg}");
+    }
+
+    #[test]
+    fn states_keep_apart_and_walls_cover_them() {
+        let (grid, svg) = (rooms(), picture(false));
+        let (left, right) = (pixel(&svg, &grid, 1, 4), pixel(&svg, &grid, 9, 1));
+        assert!(STATES.contains(&left.as_str()), "left room is {left}");
+        assert!(STATES.contains(&right.as_str()), "right room is {right}");
+        assert_ne!(left, right, "two states");
+        assert_eq!(pixel(&svg, &grid, 8, 4), WALL, "wall in the right room");
+    }
+
+    #[test]
+    fn heat_grows_brighter() {
+        let grid = rooms();
+        let field: Vec<f32> = (0..grid.frame().len()).map(|i| grid.frame().cell(i).col as f32).collect();
+        let svg = Scene::new(&grid).heat_map(&field).to_svg();
+        assert_eq!(pixel(&svg, &grid, 9, 1), ramp(1.0), "the largest value");
+        assert_eq!(pixel(&svg, &grid, 0, 3), WALL, "walls stay");
+        let broken = vec![f32::NAN; field.len()];
+        let svg = Scene::new(&grid).heat_map(&broken).to_svg();
+        assert_eq!(pixel(&svg, &grid, 9, 1), ramp(0.0), "a field of NaN is dark");
+    }
+
+    #[test]
+    fn pictures_are_readable_and_equal_each_time() {
+        for is_drive in [false, true] {
+            let svg = picture(is_drive);
+            assert_eq!(svg, picture(is_drive), "bytes differ");
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "not a number: {svg}");
+            let png = svg_to_png(&svg, 300).unwrap();
+            let size = image::load_from_memory(&png).map(|image| (image.width(), image.height()));
+            assert_eq!(size.unwrap(), (300, 164), "longer side as asked");
+        }
+    }
+
+    #[test]
+    fn the_picture_is_cut_to_what_is_known() {
+        let unknown_margin = OccupancyGrid::from_ascii(1.0, "?????\n??.#?\n?????\n?????").unwrap();
+        assert_eq!(View::of_known(&unknown_margin), View { left: 1, top: 0, width: 4, height: 3 });
+        let nothing = OccupancyGrid::from_ascii(1.0, "??\n??").unwrap();
+        assert_eq!(View::of_known(&nothing), View { left: 0, top: 0, width: 2, height: 2 });
+    }
+
+    #[test]
+    fn footprints_stand_apart_and_at_both_ends() {
+        let poses: Vec<Pose> = (0..=25).map(|i| Pose::new(f64::from(i) * 0.1, 0.0, 0.0)).collect();
+        let x: Vec<f64> = spaced(&poses, 1.0).iter().map(|pose| pose.position.x).collect();
+        assert_eq!(x, [0.0, 1.0, 2.0, 2.5]);
+        assert!(spaced(&[], 1.0).is_empty(), "no pose");
+    }
 }

@@ -17,17 +17,19 @@ pub(super) struct Svg {
 }
 
 impl Svg {
-    /// A document of `width` x `height` user units, shown `width_px` wide.
-    pub(super) fn new(width: f64, height: f64, width_px: f64) -> Self {
+    /// A document that shows `view` (left, top, width, height in user units) with a longer side of
+    /// `side_px` pixels.
+    pub(super) fn new(view: [f64; 4], side_px: f64) -> Self {
         let mut svg = Self { text: String::new(), open: Vec::new() };
-        let height_px = width_px * height / width;
+        let [_, _, width, height] = view;
+        let scale = side_px / width.max(height);
         svg.open(
             "svg",
             &[
                 ("xmlns", "http://www.w3.org/2000/svg".into()),
-                ("viewBox", format!("0 0 {} {}", number(width), number(height))),
-                ("width", number(width_px)),
-                ("height", number(height_px)),
+                ("viewBox", view.map(number).join(" ")),
+                ("width", number(width * scale)),
+                ("height", number(height * scale)),
             ],
         );
         svg
@@ -135,7 +137,7 @@ mod tests {
 
     #[test]
     fn elements_nest_and_close() {
-        let mut svg = Svg::new(4.0, 2.0, 100.0);
+        let mut svg = Svg::new([0.0, 0.0, 4.0, 2.0], 100.0);
         svg.open("g", &[("fill", "red".into())]);
         svg.element(
             "path",
