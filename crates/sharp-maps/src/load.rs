@@ -1,0 +1,125 @@
+//! From what the user typed to a grid: content and ending decide what kind of map it is.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use sharp_space::{OccupancyGrid, Pose};
+
+use crate::error::MapError;
+use crate::files::{self, Kind};
+use crate::{floor_plan, movingai, named, picture, ros};
+
+/// The side length above which Nav2 refuses a map.
+pub(crate) const SIDE_MAX: usize = 32_767;
+
+/// 8192 x 8192 cells: 409 m at 0.05 m a cell. Larger maps cost gigabytes further on.
+pub(crate) const CELLS_MAX: usize = 1 << 26;
+
+/// How to read a map.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LoadOptions {
+    /// Metres a cell, for files that do not say: MovingAI maps (1.0 if `None`) and plain images
+    /// (required).
+    pub resolution_m: Option<f64>,
+    /// Takes unknown cells as free.
+    pub unknown_free: bool,
+    /// Lets a ROS map name an image outside its own folder.
+    pub allow_outside: bool,
+}
+
+/// A question posed in an environment: from where to where.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Problem {
+    /// Where the robot starts.
+    pub start: Pose,
+    /// Where it shall go.
+    pub goal: Pose,
+}
+
+/// A map as it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapFile {
+    /// The letter of an own environment, otherwise the file's name without its ending.
+    pub name: String,
+    /// What is free.
+    pub grid: OccupancyGrid,
+    /// The problems posed in an own environment; none for files.
+    pub problems: Vec<Problem>,
+    /// What was accepted but is likely not meant, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the map that `spec` names: an own environment (see [`named_maps`](crate::named_maps)) or
+/// else the path of a file.
+///
+/// # Errors
+/// Returns an error if there is no such map or its file is broken, too large, or names an image
+/// that may not be read.
+pub fn load(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
+    let mut map = match named::find(spec) {
+        Some(map) => map?,
+        None => load_file(spec, options)?,
+    };
+    if options.unknown_free {
+        map.grid = map.grid.with_unknown_free();
+    }
+    Ok(map)
+}
+
+fn load_file(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
+    let path = Path::new(spec);
+    let looks_like_a_name = !spec.contains(['/', '\\', '.']);
+    if looks_like_a_name && !path.exists() {
+        let names = named::named_maps().collect::<Vec<_>>().join(", ");
+        return Err(MapError::Unknown { spec: spec.to_owned(), names });
+    }
+    let mut warnings = Vec::new();
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let grid = match ending.as_str() {
+        "yaml" | "yml" => ros::load(path, options, &mut warnings)?,
+        "ron" => {
+            let bytes = files::read(path, Kind::Text)?;
+            floor_plan::parse(spec, files::as_text(spec, &bytes)?)?
+        }
+        _ => load_cells(spec, &ending, options)?,
+    };
+    if matches!(ending.as_str(), "yaml" | "yml" | "ron") && options.resolution_m.is_some() {
+        warnings.push(format!("{spec}: states its own resolution, the given one is not used"));
+    }
+    let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    Ok(MapFile { name, grid, problems: Vec::new(), warnings })
+}
+
+/// Images and MovingAI maps: files that hold the cells themselves.
+fn load_cells(spec: &str, ending: &str, options: &LoadOptions) -> Result<OccupancyGrid, MapError> {
+    let bytes = files::read(Path::new(spec), Kind::Cells)?;
+    if picture::is_picture(&bytes) {
+        let expected = "given in metres a pixel, as a plain image does not state it";
+        let resolution_m =
+            options.resolution_m.ok_or_else(|| MapError::field(spec, "resolution", "missing", expected))?;
+        let picture = picture::decode(spec, &bytes)?;
+        return ros::plain_grid(spec, &picture, resolution_m);
+    }
+    if ending == "map" || bytes.starts_with(b"type ") {
+        return movingai::parse(spec, files::as_text(spec, &bytes)?, options.resolution_m.unwrap_or(1.0));
+    }
+    if matches!(ending, "png" | "pgm" | "pnm" | "pbm" | "ppm" | "bmp") {
+        return Err(MapError::image(spec, "is no PNG, PGM or BMP image: its first bytes are unknown"));
+    }
+    Err(MapError::UnknownFormat { file: spec.to_owned() })
+}
+
+/// Refuses sizes that cannot be a map before any memory is spent on them.
+pub(crate) fn check_size(file: &str, width: usize, height: usize) -> Result<(), MapError> {
+    let side = 1..=SIDE_MAX;
+    if side.contains(&width) && side.contains(&height) && width * height <= CELLS_MAX {
+        return Ok(());
+    }
+    Err(MapError::field(
+        file,
+        "size",
+        format!("{width} x {height}"),
+        format!("1 to {SIDE_MAX} cells a side and at most {CELLS_MAX} in all"),
+    ))
+}

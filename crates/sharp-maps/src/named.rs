@@ -1,0 +1,78 @@
+//! The project's own environments, part of the program: a floor plan and five problems each.
+//!
+//! They stand in for the paper's environments (Section "Evaluating our approach"), whose files
+//! were not published: of the same sizes, in household and office style, drawn anew.
+
+use crate::error::MapError;
+use crate::floor_plan;
+use crate::load::{MapFile, Problem};
+
+/// Letter, floor plan, problems.
+const NAMED: &[(&str, &str, &str)] =
+    &[("a", include_str!("../../../assets/maps/a.ron"), include_str!("../../../assets/maps/a.problems.ron"))];
+
+/// The names of the own environments, in order.
+pub fn named_maps() -> impl Iterator<Item = &'static str> {
+    NAMED.iter().map(|(name, ..)| *name)
+}
+
+/// The own environment called `name`, if there is one.
+pub(crate) fn find(name: &str) -> Option<Result<MapFile, MapError>> {
+    let (name, plan, problems) = NAMED.iter().find(|(letter, ..)| *letter == name)?;
+    Some(read(name, plan, problems))
+}
+
+fn read(name: &str, plan: &str, problems: &str) -> Result<MapFile, MapError> {
+    let file = format!("{name}.problems.ron");
+    let problems: Vec<Problem> = ron::from_str(problems)
+        .map_err(|e| MapError::syntax(&file, format!("is no list of problems: {e}")))?;
+    let grid = floor_plan::parse(&format!("{name}.ron"), plan)?;
+    Ok(MapFile { name: name.to_owned(), grid, problems, warnings: Vec::new() })
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_space::DistanceField;
+
+    use super::*;
+    use crate::drivable::{Robot, drive_m};
+
+    fn maps() -> impl Iterator<Item = MapFile> {
+        named_maps().map(|name| find(name).expect("listed").expect("the assets are sound"))
+    }
+
+    #[test]
+    fn every_environment_has_its_size_and_five_problems_in_open_spots() {
+        for map in maps() {
+            let side_m = if map.name.as_str() < "e" { 15.0 } else { 75.0 };
+            let frame = map.grid.frame();
+            assert!((frame.width_m() - side_m).abs() < 1e-9, "{} is {} m wide", map.name, frame.width_m());
+            assert_eq!(frame.width, frame.height, "{} is square", map.name);
+            assert_eq!(map.problems.len(), 5, "problems of {}", map.name);
+            let field = DistanceField::new(&map.grid);
+            for (number, pose) in
+                map.problems.iter().enumerate().flat_map(|(n, p)| [(n, p.start), (n, p.goal)])
+            {
+                let clearance = field.clearance_lower_bound(pose.position);
+                assert!(clearance >= 0.7, "{} P{}: {pose:?} has {clearance} m", map.name, number + 1);
+            }
+        }
+    }
+
+    #[test]
+    fn both_robots_can_drive_every_problem() {
+        for map in maps() {
+            let large = map.grid.frame().width_m() > 20.0;
+            for robot in [Robot::Husky, Robot::Limo] {
+                let checker = robot.checker(&map.grid, 0.04);
+                for (number, problem) in map.problems.iter().enumerate() {
+                    let length = drive_m(robot, &checker, 0.1, problem.start, problem.goal);
+                    println!("{} P{} {robot:?}: {length:.1?} m", map.name, number + 1);
+                    let range = if large { 20.0..150.0 } else { 7.0..30.0 };
+                    let ok = length.is_some_and(|length| range.contains(&length));
+                    assert!(ok, "{} P{} {robot:?}: {length:?}", map.name, number + 1);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,394 @@
+//! ROS maps: a YAML description beside an image, read as Nav2's map server reads them.
+//!
+//! The reference is `nav2_map_server/src/map_io.cpp`: which keys there are, in which order the two
+//! thresholds apply, what the modes `trinary`, `scale` and `raw` make of a grey value, and that
+//! image rows run downwards while grid rows run upwards. Stricter than Nav2 are only the limits on
+//! sizes and numbers, the refusal of repeated keys, and where the image may lie.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_saphyr::options::{DuplicateKeyPolicy, MergeKeyPolicy, NonFiniteFloatPolicy};
+use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Pose};
+
+use crate::error::MapError;
+use crate::files::{self, Kind};
+use crate::load::LoadOptions;
+use crate::picture::{self, Picture};
+
+/// What the map saver writes and plain images are read with.
+pub(crate) const OCCUPIED_THRESHOLD: f64 = 0.65;
+/// Just below 1 - 205/255, so that the grey 205 stays unknown.
+pub(crate) const FREE_THRESHOLD: f64 = 0.196;
+
+/// Beyond this many metres a double no longer tells micrometres apart.
+const ORIGIN_MAX_M: f64 = 1e9;
+
+/// The value of an occupancy message for a cell that was never observed.
+const UNKNOWN: i8 = -1;
+
+/// How grey values become occupancy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Trinary,
+    Scale,
+    Raw,
+}
+
+/// The rules by which an image becomes a grid.
+#[derive(Clone, Copy, Debug)]
+struct Rules {
+    mode: Mode,
+    negate: bool,
+    occupied_threshold: f64,
+    free_threshold: f64,
+}
+
+impl Rules {
+    /// The value 0..=100 or −1 that Nav2 publishes for a grey value.
+    fn value_of(&self, grey: u8) -> i8 {
+        if self.mode == Mode::Raw {
+            return if grey <= 100 { grey as i8 } else { UNKNOWN };
+        }
+        // Single precision, as in Nav2: the comparison at a threshold depends on it.
+        let (occupied, free) = (self.occupied_threshold as f32, self.free_threshold as f32);
+        let share = f32::from(grey) / 255.0;
+        let share = if self.negate { share } else { 1.0 - share };
+        // The free threshold is applied last and wins where the thresholds cross.
+        if share <= free {
+            0
+        } else if share >= occupied {
+            100
+        } else if self.mode == Mode::Scale {
+            ((share - free) / (occupied - free) * 100.0).round() as i8
+        } else {
+            UNKNOWN
+        }
+    }
+
+    /// What a published value means for a robot that must not collide: only a certain 0 is free.
+    fn occupancy_of(&self, grey: u8) -> Occupancy {
+        match self.value_of(grey) {
+            0 => Occupancy::Free,
+            100 => Occupancy::Occupied,
+            _ => Occupancy::Unknown,
+        }
+    }
+}
+
+/// Everything that the YAML says.
+#[derive(Clone, Debug)]
+struct Description {
+    image: String,
+    resolution_m: f64,
+    origin: Pose,
+    rules: Rules,
+}
+
+/// Reads the map described by the YAML file at `path`.
+pub(crate) fn load(
+    path: &Path,
+    options: &LoadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<OccupancyGrid, MapError> {
+    let file = path.display().to_string();
+    let bytes = files::read(path, Kind::Text)?;
+    let description = describe(&file, files::as_text(&file, &bytes)?)?;
+    let Rules { occupied_threshold, free_threshold, .. } = description.rules;
+    if free_threshold > occupied_threshold {
+        warnings.push(format!(
+            "{file}: free_thresh {free_threshold} is above occupied_thresh {occupied_threshold}, \
+             cells in between count as free"
+        ));
+    }
+    let image = find_image(path, &file, &description.image, options)?;
+    let image_file = image.display().to_string();
+    let picture = files::read(&image, Kind::Cells).and_then(|bytes| picture::decode(&image_file, &bytes));
+    let picture = picture.map_err(|source| in_image(&file, &description.image, source))?;
+    to_grid(&file, &picture, &description)
+}
+
+/// An image without a description: white is free, black is occupied, the grey 205 is unknown.
+pub(crate) fn plain_grid(
+    file: &str,
+    picture: &Picture,
+    resolution_m: f64,
+) -> Result<OccupancyGrid, MapError> {
+    let rules = Rules {
+        mode: Mode::Trinary,
+        negate: false,
+        occupied_threshold: OCCUPIED_THRESHOLD,
+        free_threshold: FREE_THRESHOLD,
+    };
+    let origin = Pose::new(0.0, 0.0, 0.0);
+    to_grid(file, picture, &Description { image: String::new(), resolution_m, origin, rules })
+}
+
+fn to_grid(file: &str, picture: &Picture, description: &Description) -> Result<OccupancyGrid, MapError> {
+    let Picture { width, height, grey, transparent } = picture;
+    let table: Vec<Occupancy> = (0..=255).map(|grey| description.rules.occupancy_of(grey)).collect();
+    // Raw images state values, not looks: transparency means nothing there.
+    let transparent = transparent.as_ref().filter(|_| description.rules.mode != Mode::Raw);
+    let mut cells = Vec::with_capacity(grey.len());
+    for row in (0..*height).rev() {
+        let row = row * width..(row + 1) * width;
+        cells.extend(grey[row.clone()].iter().map(|&grey| table[usize::from(grey)]));
+        if let Some(transparent) = transparent {
+            let start = cells.len() - width;
+            for (cell, &transparent) in cells[start..].iter_mut().zip(&transparent[row]) {
+                *cell = if transparent { Occupancy::Unknown } else { *cell };
+            }
+        }
+    }
+    let frame = GridFrame {
+        origin: description.origin,
+        resolution_m: description.resolution_m,
+        width: *width,
+        height: *height,
+    };
+    OccupancyGrid::new(frame, cells).map_err(|e| MapError::grid(file, e))
+}
+
+/// The image's path, which must lead to somewhere inside the YAML's folder unless allowed otherwise.
+fn find_image(yaml: &Path, file: &str, image: &str, options: &LoadOptions) -> Result<PathBuf, MapError> {
+    let folder = match yaml.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let path = folder.join(image);
+    let resolve = |path: &Path| {
+        fs::canonicalize(path).map_err(|source| {
+            let unreadable = MapError::Read { file: path.display().to_string(), source };
+            in_image(file, image, unreadable)
+        })
+    };
+    // Links are followed first, so that neither `..` nor a link leads outside.
+    if !options.allow_outside && !resolve(&path)?.starts_with(resolve(folder)?) {
+        return Err(MapError::ImageOutside { file: file.to_owned(), image: image.to_owned() });
+    }
+    Ok(path)
+}
+
+fn in_image(file: &str, image: &str, source: MapError) -> MapError {
+    MapError::InImage { file: file.to_owned(), image: image.to_owned(), source: Box::new(source) }
+}
+
+fn describe(file: &str, text: &str) -> Result<Description, MapError> {
+    let fields = Fields { file, entries: parse_yaml(file, text)? };
+    let image = fields.text("image", "the path of an image file")?;
+    if image.is_empty() || image.contains('\0') {
+        return Err(MapError::field(file, "image", format!("{image:?}"), "the path of an image file"));
+    }
+    let resolution_m = fields.number("resolution", "metres a pixel, from 1e-6 to 1000")?;
+    if !(1e-6..=1000.0).contains(&resolution_m) {
+        return Err(MapError::field(file, "resolution", resolution_m, "metres a pixel, from 1e-6 to 1000"));
+    }
+    let rules = Rules {
+        mode: fields.mode()?,
+        negate: fields.negate()?,
+        occupied_threshold: fields.threshold("occupied_thresh")?,
+        free_threshold: fields.threshold("free_thresh")?,
+    };
+    Ok(Description { image, resolution_m, origin: fields.origin()?, rules })
+}
+
+/// The entries of the YAML with what is needed to complain about them.
+struct Fields<'a> {
+    file: &'a str,
+    entries: Vec<(String, Node)>,
+}
+
+impl Fields<'_> {
+    fn find(&self, key: &str) -> Option<&Node> {
+        self.entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
+    }
+
+    fn error(&self, key: &str, expected: &str) -> MapError {
+        let value = self.find(key).map_or_else(|| "missing".to_owned(), Node::describe);
+        MapError::field(self.file, key, value, expected)
+    }
+
+    fn text(&self, key: &str, expected: &str) -> Result<String, MapError> {
+        match self.find(key) {
+            Some(Node::Text(text)) => Ok(text.clone()),
+            // An image may be called `1`.
+            Some(node @ (Node::Int(_) | Node::Float(_) | Node::Bool(_))) => Ok(node.describe()),
+            _ => Err(self.error(key, expected)),
+        }
+    }
+
+    fn number(&self, key: &str, expected: &str) -> Result<f64, MapError> {
+        self.find(key).and_then(Node::number).ok_or_else(|| self.error(key, expected))
+    }
+
+    fn threshold(&self, key: &str) -> Result<f64, MapError> {
+        let expected = "a number from 0 to 1";
+        let value = self.number(key, expected)?;
+        if (0.0..=1.0).contains(&value) { Ok(value) } else { Err(self.error(key, expected)) }
+    }
+
+    fn origin(&self) -> Result<Pose, MapError> {
+        let error = || self.error("origin", "three finite numbers [x, y, yaw], metres and radians");
+        let Some(Node::List(list)) = self.find("origin") else { return Err(error()) };
+        let numbers: Vec<f64> = list.iter().filter_map(Node::number).collect();
+        match numbers[..] {
+            [x, y, yaw] if list.len() == 3 && [x, y, yaw].iter().all(|n| n.abs() <= ORIGIN_MAX_M) => {
+                Ok(Pose::new(x, y, yaw))
+            }
+            _ => Err(error()),
+        }
+    }
+
+    fn negate(&self) -> Result<bool, MapError> {
+        let negate = match self.find("negate") {
+            Some(Node::Int(number)) => Some(*number != 0),
+            Some(Node::Bool(value)) => Some(*value),
+            Some(Node::Text(text)) => match text.to_ascii_lowercase().as_str() {
+                "0" | "false" | "no" | "off" | "n" => Some(false),
+                "1" | "true" | "yes" | "on" | "y" => Some(true),
+                _ => None,
+            },
+            _ => None,
+        };
+        negate.ok_or_else(|| self.error("negate", "0, 1, true or false"))
+    }
+
+    fn mode(&self) -> Result<Mode, MapError> {
+        match self.find("mode") {
+            None => Ok(Mode::Trinary),
+            Some(Node::Text(text)) if text == "trinary" => Ok(Mode::Trinary),
+            Some(Node::Text(text)) if text == "scale" => Ok(Mode::Scale),
+            Some(Node::Text(text)) if text == "raw" => Ok(Mode::Raw),
+            Some(_) => Err(self.error("mode", "trinary, scale or raw")),
+        }
+    }
+}
+
+fn parse_yaml(file: &str, text: &str) -> Result<Vec<(String, Node)>, MapError> {
+    let options = serde_saphyr::options! {
+        // Two orders of magnitude above any real map; aliases serve no purpose in one.
+        budget: serde_saphyr::budget! {
+            max_events: 2000,
+            max_nodes: 1000,
+            max_depth: 16,
+            max_aliases: 16,
+            max_anchors: 16,
+            max_documents: 1,
+        },
+        duplicate_keys: DuplicateKeyPolicy::Error,
+        merge_keys: MergeKeyPolicy::AsOrdinary,
+        non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
+    };
+    let node: Node = serde_saphyr::from_str_with_options(text, options).map_err(|error| {
+        let reason = error.without_snippet().to_string();
+        MapError::syntax(file, format!("is no valid YAML: {}", reason.replace('\n', " ")))
+    })?;
+    match node {
+        Node::Entries(entries) => Ok(entries),
+        _ => Err(MapError::syntax(file, "is no list of `key: value` lines, as a ROS map is")),
+    }
+}
+
+/// A YAML value of any type, so that a wrong type can be reported with field and value.
+#[derive(Clone, Debug, PartialEq)]
+enum Node {
+    Null,
+    Bool(bool),
+    Int(i64),
+    Float(f64),
+    Text(String),
+    List(Vec<Self>),
+    Entries(Vec<(String, Self)>),
+}
+
+impl Node {
+    /// The value as a number; quoted numbers count, as they do in Nav2.
+    fn number(&self) -> Option<f64> {
+        match self {
+            Self::Int(value) => Some(*value as f64),
+            Self::Float(value) => Some(*value),
+            Self::Text(text) => text.trim().parse().ok(),
+            _ => None,
+        }
+    }
+
+    fn describe(&self) -> String {
+        match self {
+            Self::Null => "empty".to_owned(),
+            Self::Bool(value) => value.to_string(),
+            Self::Int(value) => value.to_string(),
+            Self::Float(value) => value.to_string(),
+            Self::Text(text) => format!("{:?}", text.chars().take(60).collect::<String>()),
+            Self::List(list) if list.len() <= 8 => {
+                format!("[{}]", list.iter().map(Self::describe).collect::<Vec<_>>().join(", "))
+            }
+            Self::List(list) => format!("a list of {} values", list.len()),
+            Self::Entries(_) => "a mapping".to_owned(),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Node {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NodeVisitor)
+    }
+}
+
+struct NodeVisitor;
+
+impl<'de> Visitor<'de> for NodeVisitor {
+    type Value = Node;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a YAML value")
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Node, E> {
+        Ok(Node::Bool(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Node, E> {
+        Ok(Node::Int(value))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Node, E> {
+        Ok(i64::try_from(value).map_or(Node::Float(value as f64), Node::Int))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Node, E> {
+        Ok(Node::Float(value))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Node, E> {
+        Ok(Node::Text(value.to_owned()))
+    }
+
+    fn visit_unit<E>(self) -> Result<Node, E> {
+        Ok(Node::Null)
+    }
+
+    fn visit_none<E>(self) -> Result<Node, E> {
+        Ok(Node::Null)
+    }
+
+    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<Node, D::Error> {
+        Node::deserialize(deserializer)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Node, A::Error> {
+        let mut list = Vec::new();
+        while let Some(node) = seq.next_element()? {
+            list.push(node);
+        }
+        Ok(Node::List(list))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node, A::Error> {
+        let mut entries = Vec::new();
+        while let Some(entry) = map.next_entry()? {
+            entries.push(entry);
+        }
+        Ok(Node::Entries(entries))
+    }
+}
