@@ -1,0 +1,57 @@
+//! The planners behind one trait, for callers that choose one at run time.
+
+use sharp_space::{Bounds, CollisionChecker, Pose, Stream};
+
+use crate::learn_and_link::learn_and_link;
+use crate::query::{Outcome, Query, RrtSettings};
+use crate::rrt::rrt;
+use crate::rrt_connect::rrt_connect;
+use crate::sampler::Uniform;
+use crate::steering::Steering;
+
+/// Answers motion planning queries.
+pub trait MotionPlanner {
+    /// A free path from the query's start to its goal, or why there is none.
+    fn plan(&self, query: &Query, checker: &dyn CollisionChecker, rng: &mut Stream) -> Outcome;
+}
+
+/// Which algorithm answers.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Algorithm {
+    /// One tree from the start: [`rrt`].
+    Rrt,
+    /// A tree from either end: [`rrt_connect`].
+    RrtConnect,
+    /// A tree from either end and from each seed: [`learn_and_link`].
+    LearnAndLink {
+        /// Poses in critical regions.
+        seeds: Vec<Pose>,
+    },
+}
+
+/// An algorithm for one robot that samples uniformly over one map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planner {
+    /// Which algorithm.
+    pub algorithm: Algorithm,
+    /// What the robot can drive.
+    pub steering: Steering,
+    /// Where to sample.
+    pub bounds: Bounds,
+    /// Budget and step sizes.
+    pub settings: RrtSettings,
+}
+
+impl MotionPlanner for Planner {
+    fn plan(&self, query: &Query, checker: &dyn CollisionChecker, rng: &mut Stream) -> Outcome {
+        let Self { algorithm, steering, bounds, settings } = self;
+        let mut sampler = Uniform { bounds: *bounds };
+        match algorithm {
+            Algorithm::Rrt => rrt(query, checker, steering, &mut sampler, settings, rng),
+            Algorithm::RrtConnect => rrt_connect(query, checker, steering, &mut sampler, settings, rng),
+            Algorithm::LearnAndLink { seeds } => {
+                learn_and_link(query, seeds, checker, steering, &mut sampler, settings, rng)
+            }
+        }
+    }
+}
