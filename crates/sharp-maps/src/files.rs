@@ -11,7 +11,7 @@ use crate::error::MapError;
 pub(crate) enum Kind {
     /// YAML or RON: a person wrote it.
     Text,
-    /// An image or a MovingAI map: a cell or more for every few bytes.
+    /// An image or a `MovingAI` map: a cell or more for every few bytes.
     Cells,
 }
 

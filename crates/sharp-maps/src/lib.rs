@@ -1,6 +1,6 @@
 //! Reads and writes map files.
 //!
-//! [`load`] takes what a user types: a ROS map (YAML and image), a MovingAI map, a plain image, a
+//! [`load`] takes what a user types: a ROS map (YAML and image), a `MovingAI` map, a plain image, a
 //! drawn floor plan, or the letter of one of the project's own environments. It gives a
 //! [`MapFile`]: an occupancy grid, and for the own environments the [`Problem`]s posed in them.
 //! [`save_ros`] writes the files that ROS's map saver would. Whatever is broken becomes a

@@ -18,7 +18,7 @@ pub(crate) const CELLS_MAX: usize = 1 << 26;
 /// How to read a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LoadOptions {
-    /// Metres a cell, for files that do not say: MovingAI maps (1.0 if `None`) and plain images
+    /// Metres a cell, for files that do not say: `MovingAI` maps (1.0 if `None`) and plain images
     /// (required).
     pub resolution_m: Option<f64>,
     /// Takes unknown cells as free.
@@ -91,7 +91,7 @@ fn load_file(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
     Ok(MapFile { name, grid, problems: Vec::new(), warnings })
 }
 
-/// Images and MovingAI maps: files that hold the cells themselves.
+/// Images and `MovingAI` maps: files that hold the cells themselves.
 fn load_cells(spec: &str, ending: &str, options: &LoadOptions) -> Result<OccupancyGrid, MapError> {
     let bytes = files::read(Path::new(spec), Kind::Cells)?;
     if picture::is_picture(&bytes) {

@@ -1,4 +1,4 @@
-//! Grid maps of the MovingAI benchmark sets (Sturtevant, "Benchmarks for Grid-Based Pathfinding",
+//! Grid maps of the `MovingAI` benchmark sets (Sturtevant, "Benchmarks for Grid-Based Pathfinding",
 //! 2012).
 //!
 //! Terrain a wheeled robot can drive on is free: ground `.` and `G`, swamp `S`. Out of bounds

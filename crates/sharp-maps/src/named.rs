@@ -67,7 +67,6 @@ mod tests {
                 let checker = robot.checker(&map.grid, 0.04);
                 for (number, problem) in map.problems.iter().enumerate() {
                     let length = drive_m(robot, &checker, 0.1, problem.start, problem.goal);
-                    println!("{} P{} {robot:?}: {length:.1?} m", map.name, number + 1);
                     let range = if large { 20.0..150.0 } else { 7.0..30.0 };
                     let ok = length.is_some_and(|length| range.contains(&length));
                     assert!(ok, "{} P{} {robot:?}: {length:?}", map.name, number + 1);

@@ -121,3 +121,141 @@ fn reason(error: &image::ImageError) -> String {
         other => format!("cannot be decoded: {other}"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A PNG of the given header whose raw scan lines are stored, not compressed.
+    struct Png {
+        size: (u32, u32),
+        depth: u8,
+        color: u8,
+        interlaced: bool,
+        /// Chunks between header and pixels.
+        extra: Vec<(&'static [u8; 4], Vec<u8>)>,
+        /// Each line begins with a 0 for "no filter".
+        lines: Vec<u8>,
+    }
+
+    const GREY: u8 = 0;
+    const PALETTE: u8 = 3;
+    const GREY_ALPHA: u8 = 4;
+    const RGBA: u8 = 6;
+
+    impl Png {
+        fn new(size: (u32, u32), depth: u8, color: u8, lines: &[u8]) -> Self {
+            Self { size, depth, color, interlaced: false, extra: Vec::new(), lines: lines.to_vec() }
+        }
+
+        fn bytes(&self) -> Vec<u8> {
+            let mut header = Vec::new();
+            header.extend(self.size.0.to_be_bytes());
+            header.extend(self.size.1.to_be_bytes());
+            header.extend([self.depth, self.color, 0, 0, u8::from(self.interlaced)]);
+            let length = self.lines.len() as u16;
+            let mut zlib = vec![0x78, 0x01, 1];
+            zlib.extend(length.to_le_bytes());
+            zlib.extend((!length).to_le_bytes());
+            zlib.extend(&self.lines);
+            zlib.extend(adler32(&self.lines).to_be_bytes());
+            let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+            push_chunk(&mut bytes, b"IHDR", &header);
+            for (name, data) in &self.extra {
+                push_chunk(&mut bytes, name, data);
+            }
+            push_chunk(&mut bytes, b"IDAT", &zlib);
+            push_chunk(&mut bytes, b"IEND", &[]);
+            bytes
+        }
+
+        fn grey(&self) -> (Vec<u8>, Option<Vec<bool>>) {
+            let picture = decode("image.png", &self.bytes()).unwrap_or_else(|e| panic!("{e}"));
+            (picture.grey, picture.transparent)
+        }
+    }
+
+    fn push_chunk(bytes: &mut Vec<u8>, name: &[u8; 4], data: &[u8]) {
+        bytes.extend((data.len() as u32).to_be_bytes());
+        let start = bytes.len();
+        bytes.extend(name);
+        bytes.extend(data);
+        let crc = bytes[start..].iter().fold(!0_u32, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
+        });
+        bytes.extend((!crc).to_be_bytes());
+    }
+
+    fn adler32(data: &[u8]) -> u32 {
+        let (a, b) = data.iter().fold((1_u32, 0_u32), |(a, b), &byte| {
+            let a = (a + u32::from(byte)) % 65_521;
+            (a, (a + b) % 65_521)
+        });
+        b << 16 | a
+    }
+
+    fn refusal(bytes: &[u8]) -> String {
+        decode("image.png", bytes).expect_err("a broken image").to_string()
+    }
+
+    #[test]
+    fn kinds_of_png_give_the_same_grey() {
+        let grey = Png::new((2, 2), 8, GREY, &[0, 0, 255, 0, 100, 7]);
+        assert_eq!(grey.grey(), (vec![0, 255, 100, 7], None), "8-bit grey");
+        let deep = Png::new((2, 1), 16, GREY, &[0, 0x64, 0x64, 0xff, 0xff]);
+        assert_eq!(deep.grey().0, [100, 255], "16-bit grey");
+        let mut palette = Png::new((2, 1), 8, PALETTE, &[0, 1, 0]);
+        palette.extra.push((b"PLTE", vec![0, 0, 0, 255, 0, 0]));
+        assert_eq!(palette.grey(), (vec![76, 0], None), "red and black from a palette");
+        palette.extra.push((b"tRNS", vec![255, 128]));
+        assert_eq!(palette.grey().1, Some(vec![true, false]), "a palette with alpha");
+        let alpha = Png::new((2, 1), 8, GREY_ALPHA, &[0, 9, 255, 9, 254]);
+        assert_eq!(alpha.grey(), (vec![9, 9], Some(vec![false, true])), "grey with alpha");
+        let color = Png::new((2, 1), 8, RGBA, &[0, 0, 255, 0, 255, 0, 0, 255, 0]);
+        assert_eq!(color.grey(), (vec![150, 29], Some(vec![false, true])), "green and blue");
+        let mut interlaced = Png::new((2, 2), 8, GREY, &[0, 0, 0, 255, 0, 100, 7]);
+        interlaced.interlaced = true;
+        assert_eq!(interlaced.grey().0, [0, 255, 100, 7], "interlaced");
+    }
+
+    #[test]
+    fn sizes_are_refused_before_pixels_are_decoded() {
+        for size in [(0, 0), (40_000, 40_000), (32_767, 32_767), (65_535, 65_537), (u32::MAX >> 1, 1)] {
+            let message = refusal(&Png::new(size, 8, GREY, &[0]).bytes());
+            assert!(message.starts_with("image.png: "), "{size:?}: {message}");
+        }
+        let message = refusal(&Png::new((8192, 8192), 16, RGBA, &[0]).bytes());
+        assert!(message.contains("needs more than 268435456 bytes"), "{message}");
+    }
+
+    #[test]
+    fn cut_pngs_are_refused() {
+        let bytes = Png::new((2, 2), 8, GREY, &[0, 0, 255, 0, 100, 7]).bytes();
+        let pixels_end = bytes.len() - 12 - 4;
+        for length in 0..pixels_end {
+            refusal(&bytes[..length]);
+        }
+        for broken in 33..pixels_end {
+            let mut bytes = bytes.clone();
+            bytes[broken] ^= 1;
+            // A flipped bit may hit nothing that matters; it must not panic.
+            let _ = decode("image.png", &bytes);
+        }
+    }
+
+    #[test]
+    fn bitmaps_are_read_and_bombs_refused() {
+        let bmp = |width: u32, height: u32| {
+            let mut bytes = b"BM".to_vec();
+            for word in [62_u32, 0, 54, 40, width, height, 0x18_0001, 0, 8, 0, 0, 0, 0] {
+                bytes.extend(word.to_le_bytes());
+            }
+            bytes.extend([255, 255, 255, 0, 0, 0, 0, 0]);
+            bytes
+        };
+        assert_eq!(decode("image.bmp", &bmp(2, 1)).expect("sound").grey, [255, 0], "white, black");
+        refusal(&bmp(40_000, 40_000));
+        refusal(&bmp(0, 1));
+        refusal(&bmp(2, 1)[..56]);
+    }
+}
