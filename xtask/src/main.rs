@@ -1,3 +1,64 @@
-//! Development tasks.
+//! Development tasks: `cargo xtask COMMAND`.
+//!
+//! Nothing is computed here: the tasks call cargo and the `sharp` command. This package knows no
+//! other of the workspace, so that it builds in seconds.
 
-fn main() {}
+#![allow(clippy::disallowed_methods, reason = "a development tool reads arguments, clock and environment")]
+
+mod bench;
+mod ci;
+mod eval;
+mod process;
+mod stats;
+mod tidy;
+mod train_regions;
+mod tree;
+
+use std::process::ExitCode;
+
+use crate::tree::Tree;
+
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+  ci                     everything that must pass: format, tidy, clippy, docs, tests
+  tidy                   house rules that no compiler checks
+  stats                  a table of lines, functions and docs of each crate
+  train-regions [ARGS]   sharp regions train ARGS, on the ndarray device by default
+  eval [--profile smoke|quick|paper] [ARGS]
+                         sharp eval of that suite
+  bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion";
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let (command, rest) = match args.split_first() {
+        Some((command, rest)) => (command.as_str(), rest),
+        None => ("help", &[][..]),
+    };
+    let outcome = match command {
+        "ci" => ci::run(),
+        "tidy" => tidy::run(),
+        "stats" => Tree::load().map(|tree| {
+            print!("{}", stats::table(&tree));
+            0
+        }),
+        "train-regions" => train_regions::run(rest),
+        "eval" => eval::run(rest),
+        "bench" => bench::run(rest),
+        "help" | "-h" | "--help" => {
+            println!("{USAGE}");
+            Ok(0)
+        }
+        unknown => {
+            eprintln!("unknown command {unknown:?}\n\n{USAGE}");
+            Ok(2)
+        }
+    };
+    match outcome {
+        Ok(code) => ExitCode::from(code),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! `cargo xtask ci`: everything that must pass before a change is merged.
+//!
+//! All steps build with the release profile, so that the heavy dependencies are compiled once; see
+//! `docs/decisions/0001-release-profile-for-tests.md`.
+
+use std::time::{Duration, Instant};
+
+use crate::process::{cargo, exit_code};
+use crate::tidy;
+
+/// Runs the steps in order up to the first that fails, and says how long each took.
+///
+/// # Errors
+/// Returns an error if a step cannot be started.
+pub(crate) fn run() -> anyhow::Result<u8> {
+    let mut times: Vec<(&str, Duration, u8)> = Vec::new();
+    for (name, step) in STEPS {
+        eprintln!("\n=== {name}");
+        let start = Instant::now();
+        let code = step()?;
+        times.push((name, start.elapsed(), code));
+        if code != 0 {
+            break;
+        }
+    }
+    eprintln!();
+    for (name, time, code) in &times {
+        eprintln!("{:7.1} s  {name}{}", time.as_secs_f64(), if *code == 0 { "" } else { "  FAILED" });
+    }
+    Ok(times.last().map_or(0, |(_, _, code)| *code))
+}
+
+type Step = fn() -> anyhow::Result<u8>;
+
+/// Cheap steps first.
+const STEPS: [(&str, Step); 5] =
+    [("format", format), ("tidy", tidy::run), ("clippy", clippy), ("docs", docs), ("tests", tests)];
+
+fn format() -> anyhow::Result<u8> {
+    exit_code(&mut cargo(&["fmt", "--all", "--check"]))
+}
+
+fn clippy() -> anyhow::Result<u8> {
+    exit_code(&mut cargo(&["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"]))
+}
+
+fn docs() -> anyhow::Result<u8> {
+    let mut command = cargo(&["doc", "--release", "--no-deps", "--workspace"]);
+    exit_code(command.env("RUSTDOCFLAGS", "-Dwarnings"))
+}
+
+fn tests() -> anyhow::Result<u8> {
+    exit_code(&mut cargo(&["test", "--release", "--workspace"]))
+}

@@ -1,0 +1,166 @@
+//! The licences of all dependencies, and packages that must not come back.
+
+use std::collections::BTreeSet;
+use std::process::Stdio;
+
+use anyhow::{Context, ensure};
+
+use super::Problem;
+use crate::process::cargo;
+
+/// Licences whose terms a binary of this project can meet; `deny.toml` holds the same list.
+const ALLOWED: [&str; 12] = [
+    "0BSD",
+    "Apache-2.0",
+    "Apache-2.0 WITH LLVM-exception",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "BSL-1.0",
+    "CC0-1.0",
+    "ISC",
+    "MIT",
+    "Unicode-3.0",
+    "Unlicense",
+    "Zlib",
+];
+
+/// Packages kept out, each with the reason.
+const BANNED: [(&str, &str); 3] = [
+    ("bincode", "is unmaintained (RUSTSEC-2025-0141)"),
+    ("serde_yaml", "is deprecated, serde-saphyr reads YAML here"),
+    ("fs2", "is abandoned, std locks files"),
+];
+
+/// Packages whose licence is not on the list but whose terms are met.
+const EXCEPTIONS: [(&str, &str); 1] = [
+    // burn prints with it; a copyleft of single files, and they are used unchanged.
+    ("colored", "MPL-2.0"),
+];
+
+/// A package that a build for this machine contains.
+#[derive(Debug, PartialEq)]
+pub(super) struct Dependency {
+    name: String,
+    licence: String,
+}
+
+/// The packages that a build for this machine contains.
+///
+/// # Errors
+/// Returns an error if cargo cannot resolve the dependencies.
+pub(super) fn dependencies() -> anyhow::Result<Vec<Dependency>> {
+    // Not `cargo metadata`: its graph holds packages of features that nobody asked for.
+    let args = ["tree", "--workspace", "--edges", "normal,build", "--prefix", "none", "--format", "{p}\t{l}"];
+    let output = cargo(&args).stderr(Stdio::inherit()).output().context("cannot start cargo tree")?;
+    ensure!(output.status.success(), "cargo tree cannot resolve the dependencies");
+    Ok(parse(&String::from_utf8_lossy(&output.stdout)))
+}
+
+/// Reads lines such as `name v1.2.3 (proc-macro)`, tab, licence; repeated packages end in `(*)`.
+fn parse(tree: &str) -> Vec<Dependency> {
+    let lines: BTreeSet<&str> = tree.lines().map(|line| line.trim_end_matches(" (*)")).collect();
+    let packages = lines.iter().filter_map(|line| {
+        let (package, licence) = line.split_once('\t')?;
+        Some(Dependency { name: package.split(' ').next()?.to_owned(), licence: licence.to_owned() })
+    });
+    packages.collect()
+}
+
+/// Checks every package against the lists above.
+pub(super) fn check(dependencies: &[Dependency]) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    for Dependency { name, licence } in dependencies {
+        let is_exception = EXCEPTIONS.contains(&(name.as_str(), licence.as_str()));
+        if !is_exception && !Expression(licence).is_allowed() {
+            let message = format!("package {name} has the licence {licence:?}, which is not on the list");
+            problems.push(Problem::new("Cargo.lock", 1, message));
+        }
+        if let Some((_, reason)) = BANNED.iter().find(|(banned, _)| banned == name) {
+            problems.push(Problem::new("Cargo.lock", 1, format!("package {name} {reason}")));
+        }
+    }
+    problems
+}
+
+/// An SPDX expression such as `(MIT OR Apache-2.0) AND Unicode-3.0`; old manifests write `MIT/Apache-2.0`.
+struct Expression<'a>(&'a str);
+
+impl Expression<'_> {
+    /// Returns true if some choice of alternatives leaves only allowed licences.
+    fn is_allowed(&self) -> bool {
+        let spaced = self.0.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
+        let mut words = spaced.split_whitespace().peekable();
+        let is_allowed = alternatives(&mut words);
+        is_allowed && words.next().is_none()
+    }
+}
+
+type Words<'a> = std::iter::Peekable<std::str::SplitWhitespace<'a>>;
+
+fn alternatives(words: &mut Words<'_>) -> bool {
+    let mut is_allowed = requirements(words);
+    while words.next_if_eq(&"OR").is_some() {
+        // Both sides are read, whatever the first one says.
+        is_allowed |= requirements(words);
+    }
+    is_allowed
+}
+
+fn requirements(words: &mut Words<'_>) -> bool {
+    let mut is_allowed = licence(words);
+    while words.next_if_eq(&"AND").is_some() {
+        is_allowed &= licence(words);
+    }
+    is_allowed
+}
+
+fn licence(words: &mut Words<'_>) -> bool {
+    if words.next_if_eq(&"(").is_some() {
+        let is_allowed = alternatives(words);
+        return words.next_if_eq(&")").is_some() && is_allowed;
+    }
+    let Some(name) = words.next() else { return false };
+    if words.next_if_eq(&"WITH").is_some() {
+        let exception = words.next().unwrap_or_default();
+        return ALLOWED.contains(&format!("{name} WITH {exception}").as_str());
+    }
+    ALLOWED.contains(&name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_allowed_choice_is_enough() {
+        for (expression, expected) in [
+            ("MIT", true),
+            ("MIT/Apache-2.0", true),
+            ("GPL-3.0 OR MIT", true),
+            ("(MIT OR Apache-2.0) AND Unicode-3.0", true),
+            ("Apache-2.0 WITH LLVM-exception OR GPL-2.0", true),
+            ("MIT AND GPL-3.0", false),
+            ("(MIT OR Apache-2.0) AND GPL-3.0", false),
+            ("GPL-3.0", false),
+            ("", false),
+            ("(MIT", false),
+        ] {
+            assert_eq!(Expression(expression).is_allowed(), expected, "{expression}");
+        }
+    }
+
+    #[test]
+    fn packages_are_read_from_the_tree() {
+        let tree = "sharp-sim v0.1.0 (/here)\tMIT\nserde v1.0.0\tMIT OR Apache-2.0\nserde v1.0.0\tMIT OR Apache-2.0 (*)\n\n";
+        let names: Vec<(String, String)> = parse(tree).into_iter().map(|p| (p.name, p.licence)).collect();
+        let expected = [("serde", "MIT OR Apache-2.0"), ("sharp-sim", "MIT")];
+        assert_eq!(names, expected.map(|(name, licence)| (name.to_owned(), licence.to_owned())));
+    }
+
+    #[test]
+    fn banned_packages_are_named_with_the_reason() {
+        let dependencies = [Dependency { name: "bincode".into(), licence: "MIT".into() }];
+        let problems = check(&dependencies);
+        assert_eq!(problems[0].message, "package bincode is unmaintained (RUSTSEC-2025-0141)");
+    }
+}
