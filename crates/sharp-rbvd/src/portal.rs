@@ -1,0 +1,164 @@
+//! Where two cells of the diagram meet, and whether a robot passes there.
+//!
+//! The paper's neighbourhood V asks only for a common border. Two rooms may share two doors, and a
+//! border may be too narrow for the robot, so each connected piece of a border that is wide enough
+//! is a [`Portal`], and neighbours are states with a portal between them.
+
+use std::collections::BTreeMap;
+
+use petgraph::unionfind::UnionFind;
+use serde::{Deserialize, Serialize};
+use sharp_space::{Cell, DistanceField, Heading, Point, Vector};
+
+use crate::diagram::StateId;
+use crate::space::{FreeSpace, NONE};
+
+/// Names a portal; equal to its position in [`Rbvd::portals`](crate::Rbvd::portals).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct PortalId(pub u32);
+
+/// One connected piece of the border between two cells of the diagram.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Portal {
+    /// Its name.
+    pub id: PortalId,
+    /// The states it joins, the lower one first.
+    pub between: (StateId, StateId),
+    /// The border point with the most clearance (ties: the one nearest to the piece's middle).
+    #[serde(with = "coordinates")]
+    pub point: Point,
+    /// The grid cell of the lower state whose side `point` is the middle of.
+    pub cell: Cell,
+    /// The direction across the border at `point`, from the lower to the higher state.
+    pub normal: Heading,
+    /// Room across the direction of travel, metres: twice the clearance of `point`, but no more
+    /// than the border piece with the robot's reach added at both ends.
+    pub width_m: f64,
+}
+
+/// Two grid cells with a common side and different states.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Crossing {
+    /// The states, the lower one first.
+    pub(crate) between: (u32, u32),
+    /// Their cells, in the same order.
+    cells: (usize, usize),
+}
+
+/// All places where two states meet, sorted.
+pub(crate) fn crossings(space: &FreeSpace, states: &[u32]) -> Vec<Crossing> {
+    let state = |index: usize| if space.is_free(index) { states[index] } else { NONE };
+    let width = space.frame.width;
+    let mut found = Vec::new();
+    for index in 0..states.len() {
+        let right = Some(index + 1).filter(|other| other % width > 0);
+        let up = Some(index + width).filter(|&other| other < states.len());
+        for other in right.into_iter().chain(up) {
+            let (here, there) = (state(index), state(other));
+            if here != there && here != NONE && there != NONE {
+                found.push(if here < there {
+                    Crossing { between: (here, there), cells: (index, other) }
+                } else {
+                    Crossing { between: (there, here), cells: (other, index) }
+                });
+            }
+        }
+    }
+    found.sort_unstable();
+    found
+}
+
+/// The portals at least `min_width_m` wide for a robot whose centre stays `reach_m` from obstacles,
+/// sorted by their states.
+pub(crate) fn find_portals(
+    space: &FreeSpace,
+    clearance: &DistanceField,
+    crossings: &[Crossing],
+    (reach_m, min_width_m): (f64, f64),
+) -> Vec<Portal> {
+    // 1 µm forgives the rounding of single-precision distances.
+    let least_m = min_width_m - 1e-6;
+    let borders = crossings.chunk_by(|a, b| a.between == b.between);
+    let pieces = borders.flat_map(|border| connected_pieces(space, border));
+    let portals = pieces.map(|piece| portal(space, clearance, &piece, reach_m));
+    let wide = portals.filter(|portal| portal.width_m >= least_m);
+    wide.zip(0..).map(|(portal, id)| Portal { id: PortalId(id), ..portal }).collect()
+}
+
+/// Splits the border of two states into pieces along which one can move from cell to cell.
+fn connected_pieces(space: &FreeSpace, border: &[Crossing]) -> Vec<Vec<Crossing>> {
+    let mut cells: Vec<usize> = border.iter().flat_map(|c| [c.cells.0, c.cells.1]).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let mut pieces = UnionFind::new(cells.len());
+    for (vertex, &cell) in cells.iter().enumerate() {
+        for (other, _) in space.moves(cell) {
+            if let Ok(other) = cells.binary_search(&other) {
+                pieces.union(vertex, other);
+            }
+        }
+    }
+    let mut by_piece: BTreeMap<usize, Vec<Crossing>> = BTreeMap::new();
+    for &crossing in border {
+        let vertex = cells.binary_search(&crossing.cells.0).expect("every border cell is listed");
+        by_piece.entry(pieces.find(vertex)).or_default().push(crossing);
+    }
+    let mut pieces: Vec<_> = by_piece.into_values().collect();
+    // By first crossing: the order shall not depend on how the sets were merged.
+    pieces.sort_unstable();
+    pieces
+}
+
+fn portal(space: &FreeSpace, clearance: &DistanceField, piece: &[Crossing], reach_m: f64) -> Portal {
+    let frame = &space.frame;
+    let place = |index| {
+        let cell = frame.cell(index);
+        Vector::new(cell.col as f64 + 0.5, cell.row as f64 + 0.5)
+    };
+    let middle = |crossing: &Crossing| (place(crossing.cells.0) + place(crossing.cells.1)) / 2.0;
+    let room = |crossing: &Crossing| {
+        let at = |index| clearance.at(frame.cell(index));
+        at(crossing.cells.0).min(at(crossing.cells.1))
+    };
+    let mean = piece.iter().map(middle).sum::<Vector>() / piece.len() as f64;
+    let best = piece
+        .iter()
+        .min_by(|a, b| {
+            let by_room = room(b).total_cmp(&room(a));
+            by_room.then((middle(a) - mean).norm().total_cmp(&(middle(b) - mean).norm())).then(a.cmp(b))
+        })
+        .expect("a piece has at least one crossing");
+
+    let across = |crossing: &Crossing| place(crossing.cells.1) - place(crossing.cells.0);
+    let (center, window) = (middle(best), room(best) / frame.resolution_m);
+    let nearby = piece.iter().filter(|crossing| (middle(crossing) - center).norm() <= window);
+    // One crossing points along a grid axis; the sum over a stretch of border points across it.
+    let sum: Vector = nearby.map(across).sum();
+    let normal = Heading::of(if sum.norm() > 0.5 { sum } else { across(best) });
+
+    let (low, high) = piece.iter().map(middle).fold((center, center), |(l, h), m| (l.inf(&m), h.sup(&m)));
+    let length_m = ((high - low).norm() + 1.0) * frame.resolution_m;
+    Portal {
+        id: PortalId(0),
+        between: (StateId(best.between.0), StateId(best.between.1)),
+        point: frame.from_grid(center),
+        cell: frame.cell(best.cells.0),
+        normal: Heading::new(normal.radians() + frame.origin.heading.radians()),
+        width_m: (2.0 * room(best) - frame.resolution_m).min(length_m + 2.0 * reach_m),
+    }
+}
+
+/// Points as `[x, y]`: nalgebra's own form would bring another dependency.
+mod coordinates {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use sharp_space::Point;
+
+    pub(super) fn serialize<S: Serializer>(point: &Point, serializer: S) -> Result<S::Ok, S::Error> {
+        [point.x, point.y].serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Point, D::Error> {
+        <[f64; 2]>::deserialize(deserializer).map(|[x_m, y_m]| Point::new(x_m, y_m))
+    }
+}
