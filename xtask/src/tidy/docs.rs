@@ -1,4 +1,4 @@
-//! Documents name only files and tests that exist.
+//! Documents name and link only files and tests that exist.
 
 use super::{Problem, quoted};
 use crate::tree::Tree;
@@ -23,6 +23,9 @@ pub(super) fn check(tree: &Tree) -> Vec<Problem> {
             for name in quoted(line).filter(|name| is_path(name) && !tree.has(name)) {
                 problems.push(Problem::new(path, i + 1, format!("names {name}, which does not exist")));
             }
+            for link in links(line).filter(|link| !is_alive(tree, path, link)) {
+                problems.push(Problem::new(path, i + 1, format!("links {link}, which does not exist")));
+            }
         }
     }
     if let Some(text) = tree.files.get(PAPER_MAP) {
@@ -43,6 +46,30 @@ fn is_path(name: &str) -> bool {
     let is_known = FOLDERS.iter().any(|folder| name.starts_with(folder));
     let is_example = name.ends_with(".ron") && !name.contains('/');
     (is_file || is_known) && name.chars().all(is_plain) && !is_parameter && !is_foreign && !is_example
+}
+
+/// The targets of the links in `line`, in order.
+fn links(line: &str) -> impl Iterator<Item = &str> {
+    line.split("](").skip(1).filter_map(|rest| rest.split(')').next())
+}
+
+/// Returns true if `link` in `document` leads to a file or folder of the repository, or out of it.
+fn is_alive(tree: &Tree, document: &str, link: &str) -> bool {
+    let target = link.split('#').next().unwrap_or_default();
+    if target.is_empty() || target.contains("://") || target.starts_with("mailto:") {
+        return true;
+    }
+    let mut parts: Vec<&str> = document.split('/').collect();
+    parts.pop();
+    for part in target.split('/').filter(|part| !part.is_empty() && *part != ".") {
+        if part == ".." {
+            parts.pop();
+        } else {
+            parts.push(part);
+        }
+    }
+    let (file, folder) = (parts.join("/"), format!("{}/", parts.join("/")));
+    tree.files.contains_key(&file) || tree.files.keys().any(|path| path.starts_with(&folder))
 }
 
 /// Checks the column of each table of the paper's map whose heading holds the word "test".
@@ -126,6 +153,16 @@ mod tests {
         let problems: Vec<String> = check(&tree).iter().map(ToString::to_string).collect();
         assert_eq!(problems, ["README.md:2: names docs/gone.md, which does not exist"]);
         assert_eq!(check(&Tree::of(&[])).len(), 3, "the required documents");
+    }
+
+    #[test]
+    fn links_are_followed_from_their_document() {
+        let tree = Tree::of(&[("README.md", ""), ("docs/README.md", ""), ("docs/decisions/0001-a.md", "")]);
+        for link in ["../README.md#try", "decisions", "./decisions/0001-a.md", "https://a.b/c.md", "#top"] {
+            assert!(is_alive(&tree, "docs/README.md", link), "{link}");
+        }
+        assert!(!is_alive(&tree, "docs/README.md", "0001-a.md"), "another folder");
+        assert_eq!(links("a [b](c.md) and [d](e)").collect::<Vec<_>>(), ["c.md", "e"]);
     }
 
     #[test]
