@@ -7,9 +7,18 @@ use crate::error::MapError;
 use crate::floor_plan;
 use crate::load::{MapFile, Problem};
 
-/// Letter, floor plan, problems.
-const NAMED: &[(&str, &str, &str)] =
-    &[("a", include_str!("../../../assets/maps/a.ron"), include_str!("../../../assets/maps/a.problems.ron"))];
+/// An environment's letter, floor plan and problems, from the files of its name.
+macro_rules! environments {
+    ($($letter:literal)*) => {
+        [$((
+            $letter,
+            include_str!(concat!("../../../assets/maps/", $letter, ".ron")),
+            include_str!(concat!("../../../assets/maps/", $letter, ".problems.ron")),
+        )),*]
+    };
+}
+
+const NAMED: &[(&str, &str, &str)] = &environments!["a" "b" "c" "d"];
 
 /// The names of the own environments, in order.
 pub fn named_maps() -> impl Iterator<Item = &'static str> {
@@ -68,6 +77,7 @@ mod tests {
                 for (number, problem) in map.problems.iter().enumerate() {
                     let length = drive_m(robot, &checker, 0.1, problem.start, problem.goal);
                     let range = if large { 20.0..150.0 } else { 7.0..30.0 };
+                    println!("{} P{} {robot:?}: {length:.1?} m", map.name, number + 1);
                     let ok = length.is_some_and(|length| range.contains(&length));
                     assert!(ok, "{} P{} {robot:?}: {length:?}", map.name, number + 1);
                 }
