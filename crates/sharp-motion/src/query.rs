@@ -1,4 +1,4 @@
-//! The motion planning problem and its answers (paper, "Background": ⟨X, f, x_i, x_g⟩).
+//! The motion planning problem and its answers (paper, "Background").
 
 use sharp_space::{CollisionChecker, Pose};
 

@@ -1,4 +1,4 @@
-//! RRT (LaValle 1998) with goal bias: the planner of the paper's baseline "RRT with replanning".
+//! RRT (`LaValle` 1998) with goal bias: the planner of the paper's baseline "RRT with replanning".
 
 use rand::RngExt;
 use sharp_space::{CollisionChecker, Stream};

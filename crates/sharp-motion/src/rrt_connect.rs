@@ -1,4 +1,4 @@
-//! RRT-Connect (Kuffner and LaValle 2000) for directed motions: the goal's tree grows backwards.
+//! RRT-Connect (Kuffner and `LaValle` 2000) for directed motions: the goal's tree grows backwards.
 
 use sharp_space::{CollisionChecker, Stream};
 

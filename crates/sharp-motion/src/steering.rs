@@ -18,6 +18,12 @@ pub enum Steering {
 }
 
 impl Steering {
+    /// The steering of a robot with the given smallest turning radius, metres; 0 if it turns in place.
+    #[must_use]
+    pub fn of(radius_m: f64) -> Self {
+        if radius_m > 0.0 { Self::Dubins { radius_m } } else { Self::RotateTranslate }
+    }
+
     /// The connection of `from` to `to`.
     #[must_use]
     pub fn maneuver(&self, from: Pose, to: Pose) -> Maneuver {

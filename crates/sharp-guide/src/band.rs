@@ -1,0 +1,188 @@
+//! Smoothing of a path as an elastic band (Quinlan and Khatib 1993) with bending stiffness.
+//!
+//! The band minimises tension, bending and the lack of room, from coarse to fine: on a coarse band
+//! far ends feel each other within few rounds, and each finer level only adds detail.
+
+use sharp_space::Vector;
+
+use crate::floor::Floor;
+
+/// The spacing of the coarsest band, metres; also the length of a straight end.
+pub(crate) const COARSE_M: f64 = 0.4;
+/// Rounds on each level; every level halves the spacing.
+const ROUNDS: [usize; 3] = [200, 60, 30];
+/// Each move goes this much beyond its balance: over-relaxation, which settles several times sooner.
+const HASTE: f64 = 1.6;
+
+/// How the band behaves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BandSettings {
+    pub(crate) pull_per_m2: f64,
+    pub(crate) stiffness_m: f64,
+    /// Directions (in the grid) in which the band leaves its first and arrives at its last point.
+    pub(crate) ends: [Option<Vector>; 2],
+}
+
+/// Smooths the polyline `draft` (units of cells); both ends stay.
+pub(crate) fn smooth(floor: &Floor<'_>, draft: &[Vector], settings: &BandSettings) -> Vec<Vector> {
+    let resolution = floor.frame().resolution_m;
+    let mut points = resample(draft, COARSE_M / resolution, 4);
+    let coarse = step_length(&points);
+    let last = points.len() - 1;
+    let mut fixed = [1, 1];
+    if let Some(direction) = settings.ends[0] {
+        points[1] = points[0] + direction * coarse;
+        fixed[0] = 2;
+    }
+    if let Some(direction) = settings.ends[1] {
+        points[last - 1] = points[last] - direction * coarse;
+        fixed[1] = 2;
+    }
+    let mut spacing = coarse;
+    for (level, &rounds) in ROUNDS.iter().enumerate() {
+        if level > 0 {
+            points = refine(&points);
+            spacing /= 2.0;
+            fixed = fixed.map(|count| 2 * count - 1);
+            straighten_ends(&mut points, fixed);
+        }
+        let force = Force::new(settings, spacing, resolution);
+        for _ in 0..rounds {
+            relax(floor, &mut points, fixed, &force);
+        }
+    }
+    points
+}
+
+/// The weights of one level; spacing in cells.
+struct Force {
+    bending: f64,
+    pull: f64,
+    resolution_m: f64,
+    inertia: f64,
+}
+
+impl Force {
+    /// For unit tension: bending weighs (stiffness / spacing)², and a curvature of `pull` times the
+    /// lack of room is in balance.
+    fn new(settings: &BandSettings, spacing: f64, resolution_m: f64) -> Self {
+        let spacing_m = spacing * resolution_m;
+        let bending = (settings.stiffness_m / spacing_m).powi(2);
+        let pull = settings.pull_per_m2 * spacing_m * spacing_m;
+        Self { bending, pull, resolution_m, inertia: 2.0 + 6.0 * bending + pull }
+    }
+}
+
+/// One round over the free points, in place.
+fn relax(floor: &Floor<'_>, points: &mut [Vector], fixed: [usize; 2], force: &Force) {
+    let last = points.len() - 1;
+    for i in fixed[0]..=last - fixed[1] {
+        let (before, here, after) = (points[i - 1], points[i], points[i + 1]);
+        let tension = before - here * 2.0 + after;
+        // Beyond a free end the band goes on straight.
+        let second = |a: Vector, b: Vector, c: Vector| a - b * 2.0 + c;
+        let left = if i >= 2 { second(points[i - 2], before, here) } else { Vector::zeros() };
+        let right = if i + 2 <= last { second(here, after, points[i + 2]) } else { Vector::zeros() };
+        let bending = tension * 2.0 - left - right;
+        let (room_m, gradient) = floor.room_and_gradient(here);
+        let lack = (floor.comfort_m - room_m).max(0.0) / force.resolution_m;
+        let step = (tension + bending * force.bending + gradient * (lack * force.pull)) / force.inertia;
+        let moved = here + step * HASTE;
+        // A point that lies in a closed cell must be able to leave it.
+        if floor.is_open_at(moved) || !floor.is_open_at(here) {
+            points[i] = moved;
+        }
+    }
+}
+
+/// Puts the fixed points of either end back onto a straight, off which a new point may lie.
+fn straighten_ends(points: &mut [Vector], fixed: [usize; 2]) {
+    let last = points.len() - 1;
+    let (first_end, second_end) = (fixed[0] - 1, last + 1 - fixed[1]);
+    for i in 1..first_end {
+        points[i] = points[0].lerp(&points[first_end], i as f64 / first_end as f64);
+    }
+    for i in second_end + 1..last {
+        let share = (i - second_end) as f64 / (last - second_end) as f64;
+        points[i] = points[second_end].lerp(&points[last], share);
+    }
+}
+
+/// Doubles the number of segments by the four-point rule, which keeps the old points and bends smoothly.
+fn refine(points: &[Vector]) -> Vec<Vector> {
+    let last = points.len() - 1;
+    let mut fine = Vec::with_capacity(2 * last + 1);
+    for i in 0..last {
+        let (a, b) = (points[i], points[i + 1]);
+        let before = if i > 0 { points[i - 1] } else { a * 2.0 - b };
+        let after = if i + 2 <= last { points[i + 2] } else { b * 2.0 - a };
+        fine.push(a);
+        fine.push((a + b) * (9.0 / 16.0) - (before + after) / 16.0);
+    }
+    fine.push(points[last]);
+    fine
+}
+
+/// The polyline at equal arc lengths near `spacing`, in at least `least` segments; both ends stay.
+pub(crate) fn resample(points: &[Vector], spacing: f64, least: usize) -> Vec<Vector> {
+    let length: f64 = points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+    let count = ((length / spacing).round() as usize).max(least);
+    let mut resampled = Vec::with_capacity(count + 1);
+    let (mut segment, mut before) = (0, 0.0);
+    for i in 0..count {
+        let arc = length * i as f64 / count as f64;
+        let mut step = (points[segment + 1] - points[segment]).norm();
+        while before + step < arc && segment + 2 < points.len() {
+            before += step;
+            segment += 1;
+            step = (points[segment + 1] - points[segment]).norm();
+        }
+        let share = if step > 0.0 { ((arc - before) / step).min(1.0) } else { 0.0 };
+        resampled.push(points[segment] + (points[segment + 1] - points[segment]) * share);
+    }
+    resampled.push(points[points.len() - 1]);
+    resampled
+}
+
+fn step_length(points: &[Vector]) -> f64 {
+    points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum::<f64>() / (points.len() - 1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_space::{DistanceField, OccupancyGrid};
+
+    use super::*;
+
+    #[test]
+    fn in_the_open_a_band_becomes_straight() {
+        let row = ".".repeat(80);
+        let grid = OccupancyGrid::from_ascii(0.1, &[row.as_str(); 60].join("\n")).unwrap();
+        let field = DistanceField::new(&grid);
+        let floor = Floor { field: &field, allowed: &|_| true, least_m: 0.1, comfort_m: 0.5 };
+        let draft = [(20.0, 30.0), (40.0, 40.0), (60.0, 30.0)].map(|(x, y)| Vector::new(x, y));
+        let settings = BandSettings { pull_per_m2: 12.0, stiffness_m: 0.6, ends: [None, None] };
+        let points = smooth(&floor, &draft, &settings);
+        let off = points.iter().map(|p| (p.y - 30.0).abs()).fold(0.0, f64::max);
+        assert!(off < 0.5, "still {off} cells off the straight");
+    }
+
+    #[test]
+    fn ends_keep_the_wanted_direction() {
+        let row = ".".repeat(80);
+        let grid = OccupancyGrid::from_ascii(0.1, &[row.as_str(); 60].join("\n")).unwrap();
+        let field = DistanceField::new(&grid);
+        let floor = Floor { field: &field, allowed: &|_| true, least_m: 0.1, comfort_m: 0.5 };
+        let draft = [(20.0, 30.0), (60.0, 30.0)].map(|(x, y)| Vector::new(x, y));
+        let up = Some(Vector::new(1.0, 1.0).normalize());
+        let settings = BandSettings { pull_per_m2: 12.0, stiffness_m: 0.6, ends: [up, up] };
+        let points = smooth(&floor, &draft, &settings);
+        let turn = |a: Vector, b: Vector| a.angle(&b);
+        for pair in points.windows(3) {
+            let bend = turn(pair[1] - pair[0], pair[2] - pair[1]);
+            assert!(bend < 0.3, "a kink of {bend} rad at {}", pair[1]);
+        }
+        let leaves = points[1] - points[0];
+        assert!((leaves.x - leaves.y).abs() < 1e-9, "leaves diagonally: {leaves}");
+    }
+}

@@ -1,0 +1,142 @@
+//! Pseudo-rewards: the paper's three cases (Definition 8) and the shaped reward that learns faster.
+
+use serde::{Deserialize, Serialize};
+use sharp_space::Pose;
+
+use crate::path::GuidePath;
+
+/// Where a pose lies as seen from an option: the three cases of Definition 8.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// x ∈ β.
+    Termination,
+    /// Outside every state that the option may use.
+    Astray,
+    /// On the way.
+    Allowed,
+}
+
+/// R of Definition 8.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PseudoReward {
+    /// `r_t`, in the termination set.
+    pub success: f64,
+    /// `r_p`, astray.
+    pub stray: f64,
+}
+
+impl Default for PseudoReward {
+    /// The paper's values.
+    fn default() -> Self {
+        Self { success: 1000.0, stray: -100.0 }
+    }
+}
+
+impl PseudoReward {
+    /// R(x): `r_t`, `r_p`, or −(d(x, n(x)) + d(n(x), pₙ)) in metres, straight distances both.
+    #[must_use]
+    pub fn value(&self, guide: &GuidePath, pose: &Pose, place: Place) -> f64 {
+        match place {
+            Place::Termination => self.success,
+            Place::Astray => self.stray,
+            Place::Allowed => {
+                let nearest = guide.poses()[guide.nearest(pose.position)];
+                -(pose.distance_m(&nearest) + nearest.distance_m(&guide.end()))
+            }
+        }
+    }
+}
+
+/// What happened in one step, besides motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StepEvents {
+    /// The termination set was reached.
+    pub success: bool,
+    /// The robot touched an obstacle: ends the episode.
+    pub contact: bool,
+    /// The robot is outside the states of the option: does not end the episode.
+    pub stray: bool,
+}
+
+/// Progress along the guide as the reward of a step.
+///
+/// Arc length instead of the paper's straight distance, so that a bend that leads away is not
+/// punished; a difference instead of a level, so that no episode gains by ending early.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ShapedReward {
+    /// Per metre of progress.
+    pub progress_per_m: f64,
+    /// Per metre that the robot moved away from the path sideways.
+    pub deviation_per_m: f64,
+    /// For every step.
+    pub step: f64,
+    /// For reaching the termination set.
+    pub success: f64,
+    /// For touching an obstacle.
+    pub contact: f64,
+    /// For a step astray.
+    pub stray: f64,
+}
+
+impl Default for ShapedReward {
+    /// Values found in trials: a higher cost of contact makes robots timid, a lower one careless.
+    fn default() -> Self {
+        Self {
+            progress_per_m: 1.0,
+            deviation_per_m: -0.2,
+            step: -0.02,
+            success: 2.0,
+            contact: -5.0,
+            stray: -0.1,
+        }
+    }
+}
+
+impl ShapedReward {
+    /// The reward of a step that moved the foot on the guide by `progress_m` and changed the size of
+    /// the cross-track distance by `deviation_m`.
+    #[must_use]
+    pub fn value(&self, progress_m: f64, deviation_m: f64, events: StepEvents) -> f64 {
+        let event = |happened: bool, reward: f64| if happened { reward } else { 0.0 };
+        self.progress_per_m * progress_m
+            + self.deviation_per_m * deviation_m
+            + self.step
+            + event(events.success, self.success)
+            + event(events.contact, self.contact)
+            + event(events.stray, self.stray)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn straight() -> GuidePath {
+        GuidePath::new((0..=10).map(|i| Pose::new(f64::from(i), 0.0, 0.0)).collect(), 1.5).unwrap()
+    }
+
+    #[test]
+    fn the_three_cases_of_definition_8() {
+        let (reward, guide, pose) = (PseudoReward::default(), straight(), Pose::new(4.2, 3.0, 1.0));
+        assert_eq!(reward.value(&guide, &pose, Place::Termination), 1000.0, "r_t");
+        assert_eq!(reward.value(&guide, &pose, Place::Astray), -100.0, "r_p");
+        // n(x) is the point at x = 4: 3.0067 m away, then 6 m to the end.
+        let expected = -(0.2_f64.hypot(3.0) + 6.0);
+        assert!((reward.value(&guide, &pose, Place::Allowed) - expected).abs() < 1e-12, "on the way");
+    }
+
+    #[test]
+    fn shaped_reward_adds_its_parts() {
+        let reward = ShapedReward::default();
+        assert!(
+            (reward.value(0.5, 0.1, StepEvents::default()) - (0.5 - 0.02 - 0.02)).abs() < 1e-12,
+            "a step"
+        );
+        let end = StepEvents { success: true, ..StepEvents::default() };
+        assert!((reward.value(0.0, 0.0, end) - 1.98).abs() < 1e-12, "success");
+        let crash = StepEvents { contact: true, stray: true, ..StepEvents::default() };
+        assert!((reward.value(0.0, 0.0, crash) + 5.12).abs() < 1e-12, "contact astray");
+    }
+}
