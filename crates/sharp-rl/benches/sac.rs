@@ -1,0 +1,75 @@
+//! How long is one SAC update, by hand and through burn, and how long one decision?
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use rand::SeedableRng;
+use sharp_rl::{
+    Actor, ActorScratch, Batch, EnvironmentSpec, LearnerKind, ReplayBuffer, Sac, SacSettings, SacState,
+    SampleSettings, Stream, Transition,
+};
+
+/// The size of the guide-frame observation and the polar waypoint.
+const SPEC: EnvironmentSpec = EnvironmentSpec { observation_len: 31, action_len: 2 };
+
+fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
+    use rand::RngExt;
+    let mut buffer = ReplayBuffer::new(SPEC, 10_000);
+    for _ in 0..10_000 {
+        let mut draw = |len: usize| -> Vec<f32> { (0..len).map(|_| rng.random_range(-1.0..1.0)).collect() };
+        let (observation, next_observation, action) = (draw(31), draw(31), draw(2));
+        buffer.push(Transition {
+            observation: &observation,
+            action: &action,
+            reward: observation[0] + action[1],
+            steps: 1,
+            next_observation: &next_observation,
+            terminated: observation[1] > 0.9,
+            truncated: false,
+        });
+    }
+    buffer
+}
+
+fn sac_update(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("sac_update");
+    for (width, kind) in [
+        (64, LearnerKind::Fused),
+        (64, LearnerKind::Burn),
+        (256, LearnerKind::Fused),
+        (256, LearnerKind::Burn),
+    ] {
+        let settings = SacSettings { hidden: vec![width, width], ..SacSettings::fast() };
+        let mut rng = Stream::seed_from_u64(1);
+        let buffer = filled_buffer(&mut rng);
+        let mut state = SacState::new(SPEC, &settings, &mut rng);
+        let normaliser = state.actor.normaliser().clone();
+        let how = SampleSettings { gamma: 0.97, reward_scale: 1.0, normaliser: &normaliser };
+        let mut batch = Batch::new(SPEC, settings.batch);
+        let mut sac = Sac::new(SPEC, &settings, kind);
+        group.bench_function(format!("{kind:?}/2x{width}/batch_256").to_lowercase(), |bencher| {
+            bencher.iter(|| {
+                buffer.sample(&how, &mut rng, &mut batch);
+                sac.update(&mut state, &batch)
+            });
+        });
+        assert!(state.is_finite(), "weights after the bench");
+    }
+    group.finish();
+}
+
+fn actor_decision(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("actor_decision");
+    for width in [64, 128, 256] {
+        let actor = Actor::new(SPEC, &[width, width], &mut Stream::seed_from_u64(1));
+        let (mut scratch, mut action) = (ActorScratch::default(), [0.0; 2]);
+        group.bench_function(format!("2x{width}"), |bencher| {
+            bencher.iter(|| {
+                actor.act_mean(&[0.1; 31], &mut scratch, &mut action);
+                action[0]
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, sac_update, actor_decision);
+criterion_main!(benches);

@@ -1,0 +1,111 @@
+//! Two tiny environments on which a learner must succeed within seconds.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+
+use crate::environment::{Environment, EnvironmentSpec, Step, Stream};
+
+/// The best action repeats the observation; the reward is minus the squared difference.
+#[derive(Clone, Debug)]
+pub struct Identity {
+    len: usize,
+    steps_left: usize,
+    target: Vec<f32>,
+    rng: Stream,
+}
+
+impl Identity {
+    /// Steps in an episode, cut by a time limit.
+    pub const EPISODE_STEPS: usize = 10;
+
+    /// An identity over vectors of `len` components.
+    #[must_use]
+    pub fn new(len: usize) -> Self {
+        Self { len, steps_left: 0, target: vec![0.0; len], rng: Stream::seed_from_u64(0) }
+    }
+
+    fn draw(&mut self, observation: &mut [f32]) {
+        for (target, observation) in self.target.iter_mut().zip(observation) {
+            *target = self.rng.random_range(-0.9..0.9);
+            *observation = *target;
+        }
+    }
+}
+
+impl Environment for Identity {
+    fn spec(&self) -> EnvironmentSpec {
+        EnvironmentSpec { observation_len: self.len, action_len: self.len }
+    }
+
+    fn reset(&mut self, rng: &mut Stream, observation: &mut [f32]) {
+        self.rng = Stream::from_rng(rng);
+        self.steps_left = Self::EPISODE_STEPS;
+        self.draw(observation);
+    }
+
+    fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
+        let error: f32 = action.iter().zip(&self.target).map(|(a, t)| (a - t) * (a - t)).sum();
+        self.steps_left -= 1;
+        self.draw(observation);
+        let truncated = self.steps_left == 0;
+        Step { reward: -error, terminated: false, truncated, success: truncated && error < 0.05 }
+    }
+}
+
+/// A mass on a plane is pushed to the origin; noisy pushes, a wall of time.
+///
+/// Observation: place (x, y) and velocity. Action: acceleration. The episode terminates within
+/// 0.15 of the origin and is truncated after [`Self::EPISODE_STEPS`] steps.
+#[derive(Clone, Debug)]
+pub struct PointMass {
+    state: [f32; 4],
+    steps_left: usize,
+    rng: Stream,
+}
+
+impl Default for PointMass {
+    fn default() -> Self {
+        Self { state: [0.0; 4], steps_left: 0, rng: Stream::seed_from_u64(0) }
+    }
+}
+
+impl PointMass {
+    /// Steps after which an episode is cut.
+    pub const EPISODE_STEPS: usize = 40;
+    /// Seconds in a step.
+    const DT_S: f32 = 0.2;
+
+    fn distance(&self) -> f32 {
+        self.state[0].hypot(self.state[1])
+    }
+}
+
+impl Environment for PointMass {
+    fn spec(&self) -> EnvironmentSpec {
+        EnvironmentSpec { observation_len: 4, action_len: 2 }
+    }
+
+    fn reset(&mut self, rng: &mut Stream, observation: &mut [f32]) {
+        self.rng = Stream::from_rng(rng);
+        let angle = self.rng.random_range(0.0..std::f32::consts::TAU);
+        let (sin, cos) = angle.sin_cos();
+        self.state = [cos, sin, 0.0, 0.0];
+        self.steps_left = Self::EPISODE_STEPS;
+        observation.copy_from_slice(&self.state);
+    }
+
+    fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
+        let before = self.distance();
+        for axis in 0..2 {
+            let noise: f32 = self.rng.sample(StandardNormal);
+            let velocity = 0.9 * self.state[2 + axis] + Self::DT_S * (action[axis] + 0.1 * noise);
+            self.state[2 + axis] = velocity;
+            self.state[axis] += Self::DT_S * velocity;
+        }
+        self.steps_left -= 1;
+        observation.copy_from_slice(&self.state);
+        let success = self.distance() < 0.15;
+        let reward = before - self.distance() - 0.02 + if success { 1.0 } else { 0.0 };
+        Step { reward, terminated: success, truncated: !success && self.steps_left == 0, success }
+    }
+}
