@@ -26,9 +26,9 @@ fn bench(c: &mut Criterion) {
     let husky = Footprint::rectangle(0.5, 0.335).expect("sound");
     let limo = Footprint::rectangle(0.161, 0.11).expect("sound");
     for (name, footprint, steering, planner) in [
-        ("ridge/husky", husky, Steering::RotateTranslate, GuidePlanner::Ridge),
-        ("ridge/limo", limo, Steering::Dubins { radius_m: 0.4 }, GuidePlanner::Ridge),
-        ("learn_and_link/husky", husky, Steering::RotateTranslate, GuidePlanner::LearnAndLink),
+        ("guide_ridge/husky", husky, Steering::RotateTranslate, GuidePlanner::Ridge),
+        ("guide_ridge/limo", limo, Steering::Dubins { radius_m: 0.4 }, GuidePlanner::Ridge),
+        ("guide_learn_and_link/husky", husky, Steering::RotateTranslate, GuidePlanner::LearnAndLink),
     ] {
         let checker = FootprintChecker::new(&grid, footprint);
         let settings = GuideSettings { planner, ..GuideSettings::default() };

@@ -23,6 +23,7 @@
 
 mod band;
 mod floor;
+mod option_guide;
 mod path;
 mod plan;
 mod reward;
@@ -31,6 +32,7 @@ mod sampled;
 mod settings;
 mod workbench;
 
+pub use option_guide::{Abstraction, OptionGuide, Robot};
 pub use path::{GuidePath, GuidePathError, Projection};
 pub use plan::{GuideEnd, GuideRequest, NoGuide, plan_guide};
 pub use reward::{Place, PseudoReward, ShapedReward, StepEvents};

@@ -91,7 +91,7 @@ pub fn plan_guide(
     rng: &mut Stream,
 ) -> Result<GuidePath, NoGuide> {
     let bench = Workbench::new(request, checker, steering, settings);
-    let way = bench.least_way()?;
+    bench.has_length()?;
     if settings.planner == GuidePlanner::Ridge {
         for attempt in attempts(settings, checker.field().frame().resolution_m) {
             if let Ok(guide) = bench.ridge_guide(&attempt) {
@@ -99,6 +99,7 @@ pub fn plan_guide(
             }
         }
     }
+    let way = bench.least_way()?;
     sampled_guide(&bench, &way, rng)
 }
 

@@ -65,12 +65,14 @@ impl<'a> Workbench<'a> {
         Floor { field: self.checker.field(), allowed: self.request.allowed, least_m, comfort_m }
     }
 
+    /// Refuses a request whose ends are the same place.
+    pub(crate) fn has_length(&self) -> Result<(), NoGuide> {
+        let (start, goal) = (self.request.start.position, self.request.goal.position);
+        if (start - goal).norm() < 1e-6 { Err(NoGuide::NoLength(start)) } else { Ok(()) }
+    }
+
     /// A way through all cells in which the robot could possibly stand, as points in the grid.
     pub(crate) fn least_way(&self) -> Result<Vec<Vector>, NoGuide> {
-        let (start, goal) = (self.request.start.position, self.request.goal.position);
-        if (start - goal).norm() < 1e-6 {
-            return Err(NoGuide::NoLength(start));
-        }
         // Centre to centre distances and the half cell taken off them hide up to 1.21 cells.
         let margin_m = -1.21 * self.checker.field().frame().resolution_m;
         self.draft(&self.floor(margin_m), self.settings.clearance_weight)

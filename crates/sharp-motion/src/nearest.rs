@@ -47,10 +47,8 @@ impl Nearest {
         self.next.push(self.heads[slot]);
         self.heads[slot] = self.points.len() as u32;
         self.points.push(point);
-        for axis in 0..2 {
-            self.low[axis] = self.low[axis].min(at[axis]);
-            self.high[axis] = self.high[axis].max(at[axis]);
-        }
+        self.low = [self.low[0].min(at[0]), self.low[1].min(at[1])];
+        self.high = [self.high[0].max(at[0]), self.high[1].max(at[1])];
     }
 
     /// The number of the position with the lowest `cost`, which must be at least the straight distance.
