@@ -1,1 +1,49 @@
 //! Stochastic simulator of wheeled robots.
+//!
+//! A [`RobotModel`] is data, a [`World`] is the map ready for queries, a [`Simulator`] moves the
+//! robot a time step at a time, and a [`Vehicle`] adds controller and [`NoiseModel`]: its
+//! [`act`](Vehicle::act) is one action of the paper's stochastic path planning problem, "drive at
+//! this waypoint for half a second".
+//!
+//! ```
+//! use std::sync::Arc;
+//! use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, RobotModel, RobotState, Vehicle, World};
+//! use sharp_space::{OccupancyGrid, Point, Pose, Seed};
+//!
+//! let grid = OccupancyGrid::from_ascii(1.0, "......\n......\n......").unwrap();
+//! let robot = Arc::new(RobotModel::husky());
+//! let world = Arc::new(World::new(&grid, robot.footprint));
+//! let sim = KinematicSim::new(world, &robot);
+//! let mut vehicle = Vehicle::new(sim, robot, NoiseModel::nominal(), ActionSettings::default());
+//! vehicle.reset(RobotState::at_rest(Pose::new(1.0, 1.5, 0.0)), Seed(1), 0);
+//! let report = vehicle.act(Point::new(1.5, 1.5));
+//! assert!(!report.contact && report.path_m > 0.1, "{report:?}");
+//! ```
+//!
+//! Everything random is keyed by (seed, episode, action): a clone of a vehicle is a fork that
+//! continues bit for bit as the original would.
+
+mod contact;
+mod controller;
+mod convert;
+mod kinematic;
+mod noise;
+mod planar;
+mod rectangles;
+mod robot;
+mod simulator;
+mod state;
+mod vehicle;
+mod wheels;
+mod world;
+
+pub use controller::{Aim, WaypointController};
+pub use kinematic::KinematicSim;
+pub use noise::{ActionNoise, EpisodeNoise, NoiseError, NoiseModel, SlipperyPatches};
+pub use planar::PlanarSim;
+pub use rectangles::{CellRectangle, merge_blocked_cells};
+pub use robot::{Drive, RobotError, RobotModel};
+pub use simulator::{AnySim, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
+pub use state::{Command, RobotState};
+pub use vehicle::{ActionReport, ActionSettings, Vehicle, VehicleSnapshot};
+pub use world::World;

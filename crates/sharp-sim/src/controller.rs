@@ -1,0 +1,102 @@
+//! From the waypoint of an action to wheel commands.
+//!
+//! The actions of the paper's policies are points that the robot's own controller drives to. The
+//! controller knows the robot's limits and its mean yaw gain, nothing of the noise.
+
+use sharp_space::{Point, Pose, Vector};
+
+use crate::robot::{Drive, RobotModel};
+use crate::state::{Command, RobotState};
+
+/// Turn per bearing, 1/s: a quarter of a second to face the waypoint, well above the control period.
+const BEARING_GAIN_PS: f64 = 4.0;
+/// Bearing beyond which a robot turns in place: 60 degrees.
+const TURN_IN_PLACE_RAD: f64 = std::f64::consts::FRAC_PI_3;
+/// Least distance of the point steered at. Nearer points would turn the robot wildly as it arrives.
+const LOOK_AHEAD_M: f64 = 0.25;
+
+/// Drives a robot towards waypoints, ahead only.
+#[derive(Clone, Copy, Debug)]
+pub struct WaypointController {
+    drive: Drive,
+    yaw_gain: f64,
+    min_speed_mps: f64,
+    max_speed_mps: f64,
+    max_yaw_rate_radps: f64,
+    action_s: f64,
+}
+
+/// What one action is after: set when it begins, so that the speed does not fade on arrival.
+#[derive(Clone, Copy, Debug)]
+pub struct Aim {
+    waypoint: Point,
+    direction: Vector,
+    speed_mps: f64,
+}
+
+impl WaypointController {
+    /// A controller for `robot` whose actions last `action_s` seconds.
+    #[must_use]
+    pub fn new(robot: &RobotModel, action_s: f64) -> Self {
+        Self {
+            drive: robot.drive,
+            yaw_gain: robot.yaw_gain(),
+            min_speed_mps: robot.min_speed_mps,
+            max_speed_mps: robot.max_speed_mps,
+            max_yaw_rate_radps: robot.max_yaw_rate_radps,
+            action_s,
+        }
+    }
+
+    /// Begins an action at `pose`: the waypoint's distance asks for the speed that covers it within
+    /// the action. A waypoint that is not finite asks for a stop.
+    #[must_use]
+    pub fn aim(&self, pose: &Pose, waypoint: Point) -> Aim {
+        let way = waypoint - pose.position;
+        let distance_m = way.norm();
+        if !distance_m.is_finite() {
+            return Aim { waypoint: pose.position, direction: pose.heading.unit(), speed_mps: 0.0 };
+        }
+        let speed_mps = (distance_m / self.action_s).clamp(self.min_speed_mps, self.max_speed_mps);
+        let direction = if distance_m > 1e-6 { way / distance_m } else { pose.heading.unit() };
+        Aim { waypoint, direction, speed_mps }
+    }
+
+    /// The command for the next control period.
+    #[must_use]
+    pub fn command(&self, state: &RobotState, aim: &Aim) -> Command {
+        let left_m = (aim.waypoint - state.pose.position).dot(&aim.direction);
+        let beyond_m = (LOOK_AHEAD_M - left_m).max(0.0);
+        let target = state.pose.to_local(aim.waypoint + aim.direction * beyond_m);
+        match self.drive {
+            Drive::Differential { .. } => self.turn_towards(target, aim.speed_mps),
+            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => Command::Steer {
+                speed_mps: aim.speed_mps,
+                steer_rad: pursue(target, wheelbase_m, max_steer_rad),
+            },
+        }
+    }
+
+    fn turn_towards(&self, target: Vector, speed_mps: f64) -> Command {
+        let bearing = target.y.atan2(target.x);
+        // 1 straight ahead, 0 from the bearing on at which it turns in place.
+        let ahead = (bearing.cos() - TURN_IN_PLACE_RAD.cos()) / (1.0 - TURN_IN_PLACE_RAD.cos());
+        let turn = (BEARING_GAIN_PS * bearing).clamp(-self.max_yaw_rate_radps, self.max_yaw_rate_radps);
+        let moving = if speed_mps > 0.0 { 1.0 } else { 0.0 };
+        Command::Twist {
+            speed_mps: speed_mps * ahead.max(0.0),
+            yaw_rate_radps: moving * turn / self.yaw_gain,
+        }
+    }
+}
+
+/// Pure pursuit: the steering angle of the circle from the rear axle through `target`; full lock for
+/// a target behind, to the left if it is straight behind.
+fn pursue(target: Vector, wheelbase_m: f64, max_steer_rad: f64) -> f64 {
+    let from_axle = target + Vector::new(wheelbase_m / 2.0, 0.0);
+    if from_axle.x <= 0.0 {
+        return if from_axle.y < 0.0 { -max_steer_rad } else { max_steer_rad };
+    }
+    let curvature = 2.0 * from_axle.y / from_axle.norm_squared();
+    (wheelbase_m * curvature).atan().clamp(-max_steer_rad, max_steer_rad)
+}

@@ -1,0 +1,251 @@
+//! Robots as data: the outline, the wheels and the limits of a robot of the paper's evaluation.
+//!
+//! A robot is a RON file (`assets/robots`); nothing else in the project knows one by name. The
+//! reference point is the centre of the footprint, which is also the middle between the axles.
+
+use serde::{Deserialize, Serialize};
+use sharp_space::{Footprint, FootprintError};
+use thiserror::Error;
+
+/// Why a robot's description was refused.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RobotError {
+    /// The text is not a robot in RON.
+    #[error("robot description: {0}")]
+    Syntax(#[from] ron::error::SpannedError),
+    /// The outline is impossible.
+    #[error("robot {robot:?}: {source}")]
+    Footprint {
+        /// The robot's name.
+        robot: String,
+        /// What is wrong with the outline.
+        source: FootprintError,
+    },
+    /// A number is out of range or not a number.
+    #[error("robot {robot:?}: {field} is {value}, must be {expected}")]
+    Value {
+        /// The robot's name.
+        robot: String,
+        /// The name of the field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        expected: String,
+    },
+}
+
+/// How the wheels stand and turn.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Drive {
+    /// Two fixed wheels a side that drive at different speeds: turns in place by skidding.
+    Differential {
+        /// Distance between left and right wheels, metres.
+        track_m: f64,
+        /// Distance between front and rear axle, metres.
+        wheelbase_m: f64,
+    },
+    /// A car with steered front wheels.
+    Ackermann {
+        /// Distance between front and rear axle, metres.
+        wheelbase_m: f64,
+        /// Distance between left and right wheels, metres.
+        track_m: f64,
+        /// Largest angle of the virtual middle front wheel to either side, radians.
+        max_steer_rad: f64,
+        /// How fast that angle changes, radians per second.
+        steer_rate_radps: f64,
+    },
+}
+
+/// A wheeled robot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotModel {
+    /// What it is called in results and folders.
+    pub name: String,
+    /// Its outline.
+    pub footprint: Footprint,
+    /// Its wheels.
+    pub drive: Drive,
+    /// Mass, kilograms.
+    pub mass_kg: f64,
+    /// Moment of inertia about the vertical axis, kg m².
+    pub yaw_inertia_kgm2: f64,
+    /// Coulomb friction between wheels and floor.
+    pub wheel_friction: f64,
+    /// Fastest speed ahead, metres per second.
+    pub max_speed_mps: f64,
+    /// Fastest change of the wheels' speed, m/s².
+    pub max_accel_mps2: f64,
+    /// Fastest turn of the body, radians per second.
+    pub max_yaw_rate_radps: f64,
+    /// Fastest change of the commanded turn, rad/s².
+    pub max_yaw_accel_radps2: f64,
+    /// Slowest speed while driving; 0 for a robot that can stop and turn.
+    pub min_speed_mps: f64,
+    /// A goal counts as reached within this distance.
+    pub goal_tolerance_m: f64,
+    /// How far from the robot the waypoint of one action may lie.
+    pub waypoint_reach_m: f64,
+    /// How far it backs off from an obstacle; 0 for a robot that never reverses.
+    pub recovery_reverse_m: f64,
+}
+
+impl RobotModel {
+    /// The Clearpath Husky of the paper: moves ahead and rotates in place.
+    #[must_use]
+    pub fn husky() -> Self {
+        Self::from_ron(include_str!("../../../assets/robots/husky.ron"))
+            .expect("the built-in husky is valid, as a test shows")
+    }
+
+    /// The Limo of the paper, a small car: moves ahead and steers.
+    #[must_use]
+    pub fn limo() -> Self {
+        Self::from_ron(include_str!("../../../assets/robots/limo.ron"))
+            .expect("the built-in limo is valid, as a test shows")
+    }
+
+    /// Reads a robot from the text of a RON file.
+    ///
+    /// # Errors
+    /// Returns an error that names the first unreadable place, or the first field out of range, its
+    /// value and what would be right.
+    pub fn from_ron(text: &str) -> Result<Self, RobotError> {
+        let robot: Self = ron::from_str(text)?;
+        robot.validate()?;
+        Ok(robot)
+    }
+
+    /// The tightest turn of the rear axle's middle, metres; 0 for a robot that turns in place.
+    #[must_use]
+    pub fn min_turning_radius_m(&self) -> f64 {
+        match self.drive {
+            Drive::Differential { .. } => 0.0,
+            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => wheelbase_m / max_steer_rad.tan(),
+        }
+    }
+
+    /// Returns true if it can change its heading without moving.
+    #[must_use]
+    pub const fn can_turn_in_place(&self) -> bool {
+        matches!(self.drive, Drive::Differential { .. })
+    }
+
+    /// How fast it turns in steady state, as a share of what its wheels ask for.
+    ///
+    /// Four fixed wheels must slide sideways to turn. Isotropic friction balances at
+    /// track² / (track² + wheelbase²): 0.554 for the Husky. A steered robot rolls: 1.
+    #[must_use]
+    pub fn yaw_gain(&self) -> f64 {
+        match self.drive {
+            Drive::Differential { track_m, wheelbase_m } => {
+                track_m * track_m / (track_m * track_m + wheelbase_m * wheelbase_m)
+            }
+            Drive::Ackermann { .. } => 1.0,
+        }
+    }
+
+    /// Distance between front and rear axle, metres.
+    #[must_use]
+    pub const fn wheelbase_m(&self) -> f64 {
+        match self.drive {
+            Drive::Differential { wheelbase_m, .. } | Drive::Ackermann { wheelbase_m, .. } => wheelbase_m,
+        }
+    }
+
+    /// Distance between left and right wheels, metres.
+    #[must_use]
+    pub const fn track_m(&self) -> f64 {
+        match self.drive {
+            Drive::Differential { track_m, .. } | Drive::Ackermann { track_m, .. } => track_m,
+        }
+    }
+
+    fn validate(&self) -> Result<(), RobotError> {
+        Footprint::rectangle(self.footprint.half_length_m(), self.footprint.half_width_m())
+            .map_err(|source| RobotError::Footprint { robot: self.name.clone(), source })?;
+        let positive = |field, value, max| self.require(field, value, f64::MIN_POSITIVE, max);
+        positive("drive.wheelbase_m", self.wheelbase_m(), 20.0)?;
+        positive("drive.track_m", self.track_m(), 20.0)?;
+        if let Drive::Ackermann { max_steer_rad, steer_rate_radps, .. } = self.drive {
+            positive("drive.max_steer_rad", max_steer_rad, 1.4)?;
+            positive("drive.steer_rate_radps", steer_rate_radps, 100.0)?;
+        }
+        positive("mass_kg", self.mass_kg, 1e5)?;
+        // The wheel law corrects a whole slip in one step; a body that is easier to turn than two
+        // point masses at the wheels would overshoot by more than the slip and shake itself apart.
+        let least = 0.5 * self.mass_kg * 0.25 * (self.wheelbase_m().powi(2) + self.track_m().powi(2));
+        self.require("yaw_inertia_kgm2", self.yaw_inertia_kgm2, least, 1e6)?;
+        positive("wheel_friction", self.wheel_friction, 10.0)?;
+        positive("max_speed_mps", self.max_speed_mps, 100.0)?;
+        positive("max_accel_mps2", self.max_accel_mps2, 1000.0)?;
+        positive("max_yaw_rate_radps", self.max_yaw_rate_radps, 100.0)?;
+        positive("max_yaw_accel_radps2", self.max_yaw_accel_radps2, 1000.0)?;
+        self.require("min_speed_mps", self.min_speed_mps, 0.0, self.max_speed_mps)?;
+        positive("goal_tolerance_m", self.goal_tolerance_m, 100.0)?;
+        positive("waypoint_reach_m", self.waypoint_reach_m, 100.0)?;
+        self.require("recovery_reverse_m", self.recovery_reverse_m, 0.0, 100.0)
+    }
+
+    /// Refuses everything outside `min..=max`, NaN included.
+    fn require(&self, field: &'static str, value: f64, min: f64, max: f64) -> Result<(), RobotError> {
+        if (min..=max).contains(&value) {
+            return Ok(());
+        }
+        let expected = if min == f64::MIN_POSITIVE {
+            format!("above 0 and at most {max}")
+        } else {
+            format!("from {min} to {max}")
+        };
+        Err(RobotError::Value { robot: self.name.clone(), field, value, expected })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use expect_test::{Expect, expect};
+
+    use super::*;
+
+    const HUSKY: &str = include_str!("../../../assets/robots/husky.ron");
+    const LIMO: &str = include_str!("../../../assets/robots/limo.ron");
+
+    #[test]
+    fn the_built_in_robots_are_those_of_the_paper() {
+        let (husky, limo) = (RobotModel::husky(), RobotModel::limo());
+        assert!(husky.can_turn_in_place(), "the husky rotates in place");
+        assert_eq!(husky.min_turning_radius_m(), 0.0, "husky");
+        assert!((husky.yaw_gain() - 0.554).abs() < 1e-3, "husky's yaw gain {}", husky.yaw_gain());
+        assert!(!limo.can_turn_in_place(), "the limo is a car");
+        assert!((limo.min_turning_radius_m() - 0.4).abs() < 1e-3, "limo {}", limo.min_turning_radius_m());
+        assert_eq!(limo.yaw_gain(), 1.0, "limo's yaw gain");
+    }
+
+    #[test]
+    fn a_robot_survives_a_round_trip() {
+        for robot in [RobotModel::husky(), RobotModel::limo()] {
+            let text = ron::to_string(&robot).unwrap();
+            assert_eq!(RobotModel::from_ron(&text).unwrap(), robot, "{text}");
+        }
+    }
+
+    #[test]
+    fn errors_name_field_value_and_what_would_be_right() {
+        refuse(HUSKY, "mass_kg: 46.0", "mass_kg: NaN", expect![[""]]);
+        refuse(HUSKY, "inertia_kgm2: 5.0", "inertia_kgm2: 1.0", expect![[""]]);
+        refuse(LIMO, "max_steer_rad: 0.4636476", "max_steer_rad: 1.6", expect![[""]]);
+        refuse(LIMO, "min_speed_mps: 0.1", "min_speed_mps: 2.0", expect![[""]]);
+        refuse(LIMO, "half_width_m: 0.11", "half_width_m: -0.11", expect![[""]]);
+        refuse(LIMO, "mass_kg: 4.8", "mas_kg: 4.8", expect![[""]]);
+    }
+
+    fn refuse(text: &str, from: &str, to: &str, expected: Expect) {
+        let changed = text.replace(from, to);
+        assert_ne!(text, changed, "the test changes nothing: {from}");
+        expected.assert_eq(&RobotModel::from_ron(&changed).expect_err(to).to_string());
+    }
+}

@@ -1,0 +1,131 @@
+//! The part of a simulation that never changes: the map, ready for queries by one robot.
+
+use sharp_space::{DistanceField, Footprint, FootprintChecker, GridFrame, OccupancyGrid, Pose, Vector};
+
+use crate::convert::Obstacles;
+use crate::rectangles::{CellRectangle, merge_blocked_cells};
+
+/// The map around a robot of a given outline; shared by all simulators and their forks.
+#[derive(Clone, Debug)]
+pub struct World {
+    checker: FootprintChecker,
+    rectangles: Vec<CellRectangle>,
+    obstacles: Obstacles,
+    cover: Cover,
+}
+
+impl World {
+    /// Prepares `grid` for a robot of outline `footprint`; whatever is not free blocks it, and so
+    /// does the border of the grid.
+    #[must_use]
+    pub fn new(grid: &OccupancyGrid, footprint: Footprint) -> Self {
+        let rectangles = merge_blocked_cells(grid);
+        Self {
+            obstacles: Obstacles::new(grid.frame(), &rectangles),
+            checker: FootprintChecker::new(grid, footprint),
+            rectangles,
+            cover: Cover::new(&footprint),
+        }
+    }
+
+    /// Where the grid lies in the world.
+    #[must_use]
+    pub const fn frame(&self) -> &GridFrame {
+        self.checker.field().frame()
+    }
+
+    /// The exact collision test of the robot's outline.
+    #[must_use]
+    pub const fn checker(&self) -> &FootprintChecker {
+        &self.checker
+    }
+
+    /// The distance field of the map.
+    #[must_use]
+    pub const fn field(&self) -> &DistanceField {
+        self.checker.field()
+    }
+
+    /// The blocked cells, merged.
+    #[must_use]
+    pub fn rectangles(&self) -> &[CellRectangle] {
+        &self.rectangles
+    }
+
+    /// How far every point of the outline at `pose` can certainly move before it meets an obstacle,
+    /// metres; 0 or less where only the exact test can tell.
+    pub(crate) fn slack_m(&self, pose: &Pose) -> f64 {
+        let frame = self.frame();
+        let at = |ahead_m: f64| {
+            let center = pose.to_world(Vector::new(ahead_m, 0.0));
+            frame.cell_at(center).map_or(0.0, |cell| self.field().at(cell))
+        };
+        let least = self.cover.offsets_m.iter().map(|&offset| at(offset)).fold(f64::INFINITY, f64::min);
+        // The field measures from cell centre to cell centre: half a diagonal at either end.
+        least - std::f64::consts::SQRT_2 * frame.resolution_m - self.cover.radius_m
+    }
+
+    /// Distance from the reference point to the furthest centre of a disc of the cover, metres.
+    pub(crate) const fn cover_reach_m(&self) -> f64 {
+        self.cover.offsets_m[2]
+    }
+
+    pub(crate) const fn obstacles(&self) -> &Obstacles {
+        &self.obstacles
+    }
+}
+
+/// Three discs along the robot's axis that together cover its outline. More discs fit the sides
+/// better but stick out further in front.
+#[derive(Clone, Copy, Debug)]
+struct Cover {
+    offsets_m: [f64; 3],
+    radius_m: f64,
+}
+
+impl Cover {
+    fn new(footprint: &Footprint) -> Self {
+        let third_m = footprint.half_length_m() / 3.0;
+        Self {
+            offsets_m: [-2.0 * third_m, 0.0, 2.0 * third_m],
+            radius_m: third_m.hypot(footprint.half_width_m()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_space::CollisionChecker;
+
+    use super::*;
+
+    #[test]
+    fn where_there_is_slack_the_robot_is_free() {
+        let grid = OccupancyGrid::from_ascii(
+            0.5,
+            "
+            ##########
+            #........#
+            #........#
+            #......#.#
+            #........#
+            ##########",
+        )
+        .unwrap();
+        let world = World::new(&grid, Footprint::rectangle(0.4, 0.2).unwrap());
+        let mut roomy = 0;
+        arbtest::arbtest(|u| {
+            let mut number =
+                |max: f64| u.int_in_range(0..=100_000_u32).map(|i| f64::from(i) / 100_000.0 * max);
+            let pose = Pose::new(number(5.0)?, number(3.0)?, number(6.3)?);
+            if world.slack_m(&pose) > 0.0 {
+                roomy += 1;
+                assert!(world.checker().is_free_exact(pose), "{pose:?}");
+            }
+            Ok(())
+        });
+        assert!(roomy > 0, "the room has poses with slack");
+        assert!(world.slack_m(&Pose::new(f64::NAN, 0.0, 0.0)) < 0.0, "no slack nowhere");
+        assert!(!world.checker().is_free(Pose::new(f64::NAN, 0.0, 0.0)));
+    }
+}
