@@ -11,7 +11,7 @@ struct Counts {
     files: usize,
     /// Lines above the unit tests that are neither blank nor comment.
     code: usize,
-    /// Lines of unit tests, integration tests and benches that are neither blank nor comment.
+    /// Lines of tests, benches and examples that are neither blank nor comment.
     test: usize,
     doc: usize,
     comment: usize,
@@ -66,7 +66,7 @@ fn write_row(table: &mut String, name: &str, counts: &mut Counts) {
 
 fn count(path: &str, text: &str, counts: &mut Counts) {
     counts.files += 1;
-    let mut is_test = ["tests/", "/tests/", "/benches/"].iter().any(|part| path.contains(part));
+    let mut is_test = is_test_file(path);
     let mut open: Option<(usize, usize, String)> = None;
     for (i, line) in text.lines().enumerate() {
         let trimmed = line.trim_start();
@@ -89,6 +89,11 @@ fn count(path: &str, text: &str, counts: &mut Counts) {
             counts.functions.push((i + 1 - start, place));
         }
     }
+}
+
+fn is_test_file(path: &str) -> bool {
+    let folders = ["tests/", "/benches/", "/examples/"];
+    folders.iter().any(|folder| path.contains(folder)) || path.ends_with("/tests.rs")
 }
 
 fn is_function(line: &str) -> bool {

@@ -11,7 +11,11 @@ const FOREIGN: [&str; 3] = [".git", "target", "out"];
 
 /// The root of the workspace: the parent of this package's folder.
 pub(crate) fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies in the workspace").to_owned()
+    // Cargo says at run time where it found the package; the place of the build may be another
+    // checkout that shares the target folder.
+    let folder = std::env::var_os("CARGO_MANIFEST_DIR");
+    let folder = folder.map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
+    folder.parent().expect("xtask lies in the workspace").to_owned()
 }
 
 /// All files by their path from the root, with `/` between parts; files that are not text are empty.

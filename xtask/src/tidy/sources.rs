@@ -44,7 +44,11 @@ pub(super) fn check(tree: &Tree) -> Vec<Problem> {
 }
 
 fn is_library(path: &str) -> bool {
-    path.starts_with("crates/") && path.contains("/src/") && !path.starts_with("crates/sharp-cli/")
+    let is_test = path.ends_with("/tests.rs") || path.contains("/tests/");
+    path.starts_with("crates/")
+        && path.contains("/src/")
+        && !path.starts_with("crates/sharp-cli/")
+        && !is_test
 }
 
 /// The part above the unit tests.
