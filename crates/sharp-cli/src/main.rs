@@ -1,5 +1,55 @@
-//! The sharp command: from a map to a policy.
+//! The `sharp` command: from a map to a policy that knows its odds.
 
+mod args;
+mod commands;
+mod geojson;
+mod input;
+mod outcome;
+mod pictures;
+mod pipeline;
+mod progress;
 mod render;
+mod report;
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser};
+
+use crate::args::{Cli, Command};
+use crate::outcome::{Exit, Failure, say};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    progress::listen_for_interrupts();
+    let exit = dispatch(&cli).unwrap_or_else(|failure| {
+        if cli.json {
+            say!("{}", failure.to_json());
+        }
+        eprintln!("error: {failure}");
+        Exit::Broken
+    });
+    ExitCode::from(exit as u8)
+}
+
+fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
+    if let Some(threads) = cli.threads {
+        if threads == 0 {
+            return Err(Failure::new("USAGE", "--threads is 0, expected at least 1"));
+        }
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(anyhow::Error::from)?;
+    }
+    match &cli.command {
+        Command::Solve(args) => commands::solve::run(args, cli.seed, cli.json),
+        Command::Run(args) => commands::run::run(args, cli.seed, cli.json),
+        Command::Serve(args) => commands::serve::run(args),
+        Command::Abstract(args) => commands::abstraction::run(args, cli.json),
+        Command::Regions(command) => commands::regions::run(command, cli.seed, cli.json),
+        Command::Map(command) => commands::map::run(command, cli.json),
+        Command::Library(command) => commands::library::run(command, cli.json),
+        Command::Eval(args) => commands::eval::run(args, cli.seed, cli.json),
+        Command::Completions { shell } => {
+            clap_complete::generate(*shell, &mut Cli::command(), "sharp", &mut std::io::stdout());
+            Ok(Exit::Done)
+        }
+    }
+}

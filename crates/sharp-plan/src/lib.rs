@@ -1,1 +1,45 @@
-//! Algorithm 1: search, learning, composed policy, library.
+//! Algorithm 1: search, learning, the composed policy and the option library.
+//!
+//! [`solve`] takes a [`Workspace`] (map and robot), an [`Abstraction`] (diagram and options) and a
+//! [`Query`], searches a plan of options with A*, learns the policies that the [`OptionLibrary`]
+//! lacks and returns a [`Solution`] with its measured odds. A [`Plan`] keeps a solution in a folder;
+//! [`run`] drives it in a simulator, and a [`ComposedPolicy`] drives anything else.
+
+mod certify;
+mod composed;
+mod execute;
+mod files;
+mod learn;
+mod leg;
+mod library;
+mod percept;
+mod plan;
+mod planner;
+mod policy;
+mod rollout;
+mod search;
+mod sharp;
+mod starts;
+mod stats;
+mod task;
+
+pub use certify::{Certificate, Trial};
+pub use composed::{ComposedPolicy, Decision, Events};
+pub use execute::{Episode, EpisodeEnd, RunSettings, run, success};
+pub use files::{FileError, hash, read_ron, write_atomic, write_ron};
+pub use learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson, RewardMode};
+pub use leg::{Leg, LegId, Role, Target};
+pub use library::{FORMAT, OptionLibrary, StoredOption};
+pub use percept::{Percept, Tracker, Workspace};
+pub use plan::{AbstractionFile, Plan, map_hash};
+pub use planner::{Abstraction, Planner, Query, SearchSettings, Unplaced};
+pub use policy::{Correction, DecisionScratch, Follower, Form, GuideView, OptionPolicy, PolarWaypoint};
+pub use rollout::{ChainRun, Driver, LegEnd, LegOutcome, drive_chain};
+pub use search::{Candidate, OptionCost, OptionGraph};
+pub use sharp::{Monitor, Outcome, Phase, PlannedLeg, Solution, SolveSettings, kind_name, solve};
+pub use starts::{StartSpread, Starts};
+pub use stats::Tally;
+pub use task::LegTask;
+
+/// The slowest waypoint distance that a policy may choose all the way and still be in time, metres.
+pub const SLOWEST_REACH_M: f64 = 0.15;

@@ -1,0 +1,292 @@
+//! What a user may type: one definition feeds parsing and help.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// From a map to a policy that knows its odds: option learning for stochastic path planning.
+#[derive(Debug, Parser)]
+#[command(name = "sharp", version, propagate_version = true, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    /// Print one JSON object on stdout instead of text.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// Root of all randomness: equal seeds give equal bytes.
+    #[arg(long, global = true, default_value_t = 1, value_name = "N")]
+    pub(crate) seed: u64,
+    /// Worker threads; the result does not depend on it [default: all cores].
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Solve a path planning problem: regions, abstraction, search, learning, a policy on disk.
+    Solve(Solve),
+    /// Run a solved plan in a simulator and count how often it holds.
+    Run(Run),
+    /// Drive a robot from outside: poses in, waypoints out, as JSON lines.
+    Serve(Serve),
+    /// Build the abstraction of a map and draw it.
+    Abstract(Abstract),
+    /// Train, use and score the predictor of critical regions.
+    #[command(subcommand)]
+    Regions(Regions),
+    /// Look at a map file.
+    #[command(subcommand)]
+    Map(Map),
+    /// Look at an option library.
+    #[command(subcommand)]
+    Library(Library),
+    /// Run a suite of problems and write results and tables.
+    Eval(Eval),
+    /// Print a completion script for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Which map, and how to read it.
+#[derive(Debug, Args)]
+pub(crate) struct MapArgs {
+    /// A ROS map YAML, a MovingAI .map, a PNG, PGM or BMP image, or a named map (a, b, ...).
+    #[arg(value_name = "MAP")]
+    pub(crate) map: String,
+    /// Metres a cell, for files that do not say.
+    #[arg(long, value_name = "M")]
+    pub(crate) resolution: Option<f64>,
+    /// What unknown cells count as.
+    #[arg(long, value_enum, default_value_t = Unknown::Blocked)]
+    pub(crate) unknown: Unknown,
+    /// Let a ROS map name an image outside its own folder.
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Unknown {
+    Blocked,
+    Free,
+}
+
+/// The kind of option.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Kind {
+    Centroid,
+    Interface,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Learning {
+    Fast,
+    Paper,
+}
+
+/// What an abstraction is made of.
+#[derive(Debug, Args)]
+pub(crate) struct AbstractionArgs {
+    /// husky, limo or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    pub(crate) robot: String,
+    /// The kind of option.
+    #[arg(long, value_enum, default_value_t = Kind::Interface)]
+    pub(crate) options: Kind,
+    /// Where critical regions come from: net, geometric, or a file of region centres (.ron, a list of [x, y]).
+    #[arg(long, default_value = "net", value_name = "net|geometric|FILE")]
+    pub(crate) regions: String,
+    /// Distances of the diagram: geodesic, or the paper's Euclidean rule.
+    #[arg(long, value_enum, default_value_t = Metric::Geodesic)]
+    pub(crate) metric: Metric,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Metric {
+    Geodesic,
+    Paper,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Solve {
+    #[command(flatten)]
+    pub(crate) map: MapArgs,
+    #[command(flatten)]
+    pub(crate) abstraction: AbstractionArgs,
+    /// Initial configuration: metres, metres, radians in the map's frame.
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "goal")]
+    pub(crate) start: Option<String>,
+    /// Goal configuration; its heading is free.
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "start")]
+    pub(crate) goal: Option<String>,
+    /// One of a named map's own problems, instead of --start and --goal.
+    #[arg(long, value_name = "1..5", conflicts_with_all = ["start", "goal"])]
+    pub(crate) problem: Option<usize>,
+    /// How policies are learnt.
+    #[arg(long, value_enum, default_value_t = Learning::Fast)]
+    pub(crate) learning: Learning,
+    /// none, nominal, harsh, biased or a noise file (.ron).
+    #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
+    pub(crate) noise: String,
+    /// How guides are planned: along the ridge of clearance, or by the paper's learn-and-link trees.
+    #[arg(long, value_enum, default_value_t = Guide::Ridge)]
+    pub(crate) guide: Guide,
+    /// Where learnt options are kept for the next problem; "none" keeps nothing [default: a cache folder].
+    #[arg(long, value_name = "DIR|none")]
+    pub(crate) library: Option<String>,
+    /// Where the plan is written [default: a fresh folder under ./sharp-plans].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Stop after so many seconds of wall time; what was learnt is kept.
+    #[arg(long, value_name = "S")]
+    pub(crate) time_limit: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Guide {
+    Ridge,
+    Paper,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Run {
+    /// The folder that `sharp solve` wrote.
+    pub(crate) plan_dir: PathBuf,
+    /// Number of executions.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) episodes: u32,
+    /// none, nominal, harsh, biased or a noise file [default: the plan's].
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) noise: Option<String>,
+    /// The simulator.
+    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic")]
+    pub(crate) simulator: String,
+    /// Whether a robot that strayed, stands still or is late gets a new plan.
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    pub(crate) recovery: Switch,
+    /// What touching a wall means: the end of the episode, or a bump after which it goes on.
+    #[arg(long, value_enum, default_value_t = Collisions::End)]
+    pub(crate) collisions: Collisions,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Switch {
+    On,
+    Off,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Collisions {
+    End,
+    Contact,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Serve {
+    /// The folder that `sharp solve` wrote.
+    pub(crate) plan_dir: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Abstract {
+    #[command(flatten)]
+    pub(crate) map: MapArgs,
+    #[command(flatten)]
+    pub(crate) abstraction: AbstractionArgs,
+    /// Where the files are written.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Regions {
+    /// Make labels on generated maps and train the network.
+    Train(RegionsTrain),
+    /// Draw the heat map of one map and list its regions.
+    Predict(Abstract),
+    /// Score network, geometric detector and random regions on held-out maps.
+    Score(RegionsScore),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RegionsTrain {
+    /// husky, limo or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    pub(crate) robot: String,
+    /// What computes: flex, or ndarray where it is compiled in.
+    #[arg(long, default_value = "flex")]
+    pub(crate) device: String,
+    /// Size of the run.
+    #[arg(long, default_value = "default", value_name = "tiny|default|paper")]
+    pub(crate) preset: String,
+    /// Where the checkpoint is written.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RegionsScore {
+    /// husky, limo or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    pub(crate) robot: String,
+    /// Held-out maps of each kind.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) maps: u32,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Map {
+    /// Size, resolution and free area of a map.
+    Info(MapArgs),
+    /// Whether a robot has room in a map; exit code 1 if not.
+    Check {
+        #[command(flatten)]
+        map: MapArgs,
+        /// husky, limo or a robot file (.ron).
+        #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+        robot: String,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Library {
+    /// List the options of a library.
+    List {
+        /// The folder given to `--library`.
+        dir: PathBuf,
+    },
+    /// Read every file of a library and verify its checksum.
+    Check {
+        /// The folder given to `--library`.
+        dir: PathBuf,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Eval {
+    /// Which suite.
+    #[arg(value_enum, default_value_t = Suite::Smoke)]
+    pub(crate) suite: Suite,
+    /// Where results are written; a run that was stopped goes on where it was.
+    #[arg(long, value_name = "DIR", default_value = "out/eval")]
+    pub(crate) out: PathBuf,
+    /// Executions of each plan.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) episodes: u32,
+    /// How policies are learnt.
+    #[arg(long, value_enum, default_value_t = Learning::Fast)]
+    pub(crate) learning: Learning,
+    /// none, nominal, harsh, biased or a noise file (.ron).
+    #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
+    pub(crate) noise: String,
+}
+
+/// Suites of problems.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Suite {
+    /// Environment a, Husky, both kinds of option.
+    Smoke,
+    /// Every named environment, both robots, both kinds of option.
+    Quick,
+}

@@ -1,0 +1,66 @@
+//! `sharp library list|check`: what a library holds, and whether its files are sound.
+
+use std::path::Path;
+
+use serde::Serialize;
+use sharp_plan::OptionLibrary;
+
+use crate::args::Library;
+use crate::outcome::{Exit, Failure, to_json, say};
+
+#[derive(Serialize)]
+struct Report {
+    schema: &'static str,
+    options: Vec<Entry>,
+}
+
+#[derive(Serialize)]
+struct Entry {
+    world: String,
+    option: String,
+    episodes: u32,
+    successes: u32,
+    cost_s: f64,
+}
+
+pub(crate) fn run(command: &Library, json: bool) -> Result<Exit, Failure> {
+    let (dir, is_check) = match command {
+        Library::List { dir } => (dir, false),
+        Library::Check { dir } => (dir, true),
+    };
+    let options = entries(dir)?;
+    if json {
+        say!("{}", to_json(&Report { schema: "sharp.library/1", options }));
+    } else if is_check {
+        say!("{} options, every file sound", options.len());
+    } else {
+        for Entry { world, option, episodes, successes, cost_s } in &options {
+            say!("{world}  {option:<14} holds {successes}/{episodes}, {cost_s:.1} s");
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// Opens every world of the library; a damaged file is an error that names it.
+fn entries(dir: &Path) -> Result<Vec<Entry>, Failure> {
+    let unreadable = |error| Failure::new("FILE_UNREADABLE", format!("{}: {error}", dir.display()));
+    let mut worlds: Vec<String> = std::fs::read_dir(dir)
+        .map_err(unreadable)?
+        .filter_map(Result::ok)
+        .filter(|entry| entry.path().is_dir())
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .collect();
+    worlds.sort();
+    let mut entries = Vec::new();
+    for world in worlds {
+        let library = OptionLibrary::open(dir, &world)?;
+        entries.extend(library.iter().map(|(id, stored)| Entry {
+            world: world.clone(),
+            option: id.to_string(),
+            episodes: stored.learnt.verified.episodes,
+            successes: stored.learnt.verified.successes,
+            cost_s: stored.learnt.cost_s(),
+        }));
+    }
+    Ok(entries)
+}

@@ -1,0 +1,91 @@
+//! `sharp map info|check`: what a map file says, and whether a robot has room in it.
+
+use serde::Serialize;
+use sharp_plan::Workspace;
+use sharp_rbvd::{Rbvd, RbvdSettings};
+use sharp_space::Occupancy;
+
+use crate::args::Map;
+use crate::input;
+use crate::outcome::{Exit, Failure, to_json, say};
+use crate::report::MapReport;
+
+#[derive(Serialize)]
+struct Info {
+    schema: &'static str,
+    map: MapReport,
+    width: usize,
+    height: usize,
+    origin: [f64; 3],
+    free_m2: f64,
+    free: f64,
+    occupied: f64,
+    unknown: f64,
+    problems: usize,
+}
+
+#[derive(Serialize)]
+struct Check {
+    schema: &'static str,
+    robot: String,
+    passable: bool,
+    components: usize,
+    /// Share of the robot's free space that lies in components large enough for an abstract state.
+    covered: f64,
+}
+
+pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
+    match command {
+        Map::Info(args) => {
+            let map = input::map(args)?;
+            let (frame, cells) = (map.grid.frame(), map.grid.cells());
+            let share = |what| cells.iter().filter(|&&cell| cell == what).count() as f64 / cells.len() as f64;
+            let area_m2 = frame.width_m() * frame.height_m();
+            let info = Info {
+                schema: "sharp.map/1",
+                map: MapReport::new(&map.name, &map.grid),
+                width: frame.width,
+                height: frame.height,
+                origin: frame.origin.into(),
+                free_m2: share(Occupancy::Free) * area_m2,
+                free: share(Occupancy::Free),
+                occupied: share(Occupancy::Occupied),
+                unknown: share(Occupancy::Unknown),
+                problems: map.problems.len(),
+            };
+            if json {
+                say!("{}", to_json(&info));
+            } else {
+                say!(
+                    "{}: {} x {} cells of {} m = {:.1} x {:.1} m, origin ({}, {}, {})\n{:.1} m2 free ({:.1} %), {:.1} % occupied, {:.1} % unknown, {} problems",
+                    info.map.name, info.width, info.height, info.map.resolution_m, info.map.width_m, info.map.height_m,
+                    info.origin[0], info.origin[1], info.origin[2], info.free_m2, 100.0 * info.free,
+                    100.0 * info.occupied, 100.0 * info.unknown, info.problems
+                );
+            }
+            Ok(Exit::Done)
+        }
+        Map::Check { map, robot } => {
+            let map = input::map(map)?;
+            let workspace = Workspace::new(map.grid, input::robot(robot)?);
+            let resolution_m = workspace.grid.frame().resolution_m;
+            let settings = RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m);
+            let rbvd = Rbvd::build(workspace.checker.field(), &[], &settings).ok();
+            let check = Check {
+                schema: "sharp.map.check/1",
+                robot: workspace.robot.name.clone(),
+                passable: rbvd.as_ref().is_some_and(|rbvd| rbvd.component_count() > 0),
+                components: rbvd.as_ref().map_or(0, Rbvd::component_count),
+                covered: rbvd.as_ref().map_or(0.0, Rbvd::covered_share),
+            };
+            if json {
+                say!("{}", to_json(&check));
+            } else if check.passable {
+                say!("the {} has room in {}: {} separate parts", check.robot, map.name, check.components);
+            } else {
+                say!("the {} has no room in {}", check.robot, map.name);
+            }
+            Ok(if check.passable { Exit::Done } else { Exit::No })
+        }
+    }
+}

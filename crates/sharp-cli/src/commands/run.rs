@@ -1,0 +1,70 @@
+//! `sharp run`: executes a plan in a simulator and counts.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use sharp_maps::{LoadOptions, load};
+use sharp_plan::{Plan, RunSettings, run as run_plan, write_atomic};
+use sharp_sim::SimulatorKind;
+use sharp_space::Seed;
+
+use crate::args::{Collisions, Run, Switch};
+use crate::outcome::{Exit, Failure, to_json, say};
+use crate::report::RunReport;
+use crate::{input, pictures, progress};
+
+pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let plan = Arc::new(load_plan(&args.plan_dir)?);
+    let mut settings = RunSettings::new(&plan, args.episodes, Seed(seed));
+    settings.simulator = args.simulator.parse::<SimulatorKind>().map_err(|error| {
+        Failure::new("USAGE", format!("--simulator: {error}"))
+    })?;
+    if let Some(noise) = &args.noise {
+        settings.noise = input::noise(noise)?;
+    }
+    settings.recovery = args.recovery == Switch::On;
+    settings.contact_ends = args.collisions == Collisions::End;
+
+    let spinner = progress::spinner("driving");
+    let begun = Instant::now();
+    let episodes = run_plan(&plan, &settings, &|| begun.elapsed().as_secs_f64() * 1e6);
+    spinner.finish_and_clear();
+    let report = RunReport::new(&plan, &episodes);
+    let picture = pictures::plan(&plan, &plan.solution.query, &episodes);
+    pictures::write(&args.plan_dir, "run", &picture)?;
+    write_atomic(&args.plan_dir.join("run.json"), (to_json(&report) + "\n").as_bytes())?;
+    if json {
+        say!("{}", to_json(&report));
+    } else {
+        say!(
+            "{} of {} reached the goal ({:.1} %, between {:.1} and {:.1} %); predicted {:.1} %",
+            report.successes,
+            report.episodes,
+            100.0 * report.success_rate,
+            100.0 * report.lower95,
+            100.0 * report.upper95,
+            100.0 * report.predicted_success
+        );
+        say!(
+            "{} collisions, {} out of time, {} stray actions, {} recoveries; {:.1} s and {:.1} m on average; a decision takes {:.1} us (p99 {:.1})",
+            report.collisions,
+            report.timeouts,
+            report.strays,
+            report.recoveries,
+            report.mean_sim_time_s,
+            report.mean_path_m,
+            report.decision_us.p50,
+            report.decision_us.p99
+        );
+    }
+    Ok(Exit::Done)
+}
+
+/// Reads the plan in `folder` with its map.
+pub(crate) fn load_plan(folder: &Path) -> Result<Plan, Failure> {
+    let map = folder.join("map.yaml");
+    let spec = map.to_str().ok_or_else(|| Failure::new("FILE_INVALID", format!("{} is not printable", map.display())))?;
+    let grid = load(spec, &LoadOptions::default())?.grid;
+    Ok(Plan::load(folder, grid)?)
+}

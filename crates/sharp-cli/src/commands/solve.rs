@@ -1,0 +1,205 @@
+//! `sharp solve`: Algorithm 1, from a map and a problem to a policy on disk.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use sharp_guide::GuidePlanner;
+use sharp_maps::MapFile;
+use sharp_plan::{LearningMode, Outcome, Plan, Query, Solution, SolveSettings, Workspace, solve, write_atomic};
+use sharp_space::Seed;
+
+use crate::args::{Guide, Learning, Solve};
+use crate::outcome::{Exit, Failure, to_json, say};
+use crate::pipeline::{self, Built};
+use crate::progress::{SolveMonitor, Stopwatch, is_interrupted};
+use crate::report::{MapReport, Reuse, SolveReport, SolveTimes};
+use crate::{input, pictures};
+
+impl From<Learning> for LearningMode {
+    fn from(learning: Learning) -> Self {
+        match learning {
+            Learning::Fast => Self::Fast,
+            Learning::Paper => Self::Paper,
+        }
+    }
+}
+
+/// What solving gave: the report, and the plan if there is one.
+pub(crate) struct Solved {
+    pub(crate) report: SolveReport,
+    pub(crate) plan: Option<Plan>,
+}
+
+pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let Solved { report, plan } = solve_problem(args, seed)?;
+    if json {
+        say!("{}", to_json(&report));
+    } else {
+        print_report(&report);
+    }
+    Ok(match plan {
+        Some(_) => Exit::Done,
+        None if is_interrupted() => Exit::Interrupted,
+        None => Exit::No,
+    })
+}
+
+/// Solves and writes the plan folder; prints nothing.
+pub(crate) fn solve_problem(args: &Solve, seed: u64) -> Result<Solved, Failure> {
+    let mut stopwatch = Stopwatch::start();
+    stopwatch.enter("load");
+    let time_limit = args.time_limit.map(|seconds| limit(seconds)).transpose()?;
+    let map = input::map(&args.map)?;
+    let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
+    let noise = input::noise(&args.noise)?;
+    let robot = input::robot(&args.abstraction.robot)?;
+    let workspace = Workspace::new(map.grid.clone(), robot);
+    input::check_query(&workspace, &query)?;
+    let mut library = pipeline::library(args.library.as_deref(), &workspace, &noise, args.learning)?;
+    stopwatch.stop();
+
+    let cache = library.folder().map(Path::to_owned);
+    let built = pipeline::abstraction(&workspace, &args.abstraction, cache.as_deref(), &mut stopwatch)?;
+    let abstraction = built.file.abstraction();
+    let mut settings = SolveSettings::new(&workspace, args.learning.into(), noise.clone(), Seed(seed));
+    if args.guide == Guide::Paper {
+        settings.search.guide.planner = GuidePlanner::LearnAndLink;
+    }
+    let monitor = SolveMonitor::new(stopwatch, time_limit);
+    let outcome = solve(&workspace, &abstraction, query, &settings, &mut library, &monitor)?;
+    let stopwatch = monitor.into_stopwatch();
+
+    let report = blank_report(args, seed, &map, &workspace, &built, abstraction.options.options().len());
+    let plan = |solution: Solution| Plan {
+        workspace: workspace.clone(),
+        abstraction: abstraction.clone(),
+        noise: noise.clone(),
+        learning: args.learning.into(),
+        seed: Seed(seed),
+        solution,
+    };
+    let (mut report, plan) = match outcome {
+        Outcome::Solved(solution) => {
+            let plan = plan(*solution);
+            let folder = plan_folder(args, &map, &workspace)?;
+            let report = report.with_plan(&plan, &folder);
+            (report, Some((plan, folder)))
+        }
+        Outcome::NoPlan(reason) => (SolveReport { status: "no_plan", reason: Some(reason), ..report }, None),
+        Outcome::Stopped => (SolveReport { status: "timeout", reason: Some("stopped before a plan was verified; what was learnt is kept".to_owned()), ..report }, None),
+    };
+    report.time_s = SolveTimes::from(&stopwatch);
+    let plan = plan.map(|(plan, folder)| write_plan(&plan, &folder, &built, &query, &report).map(|()| plan)).transpose()?;
+    Ok(Solved { report, plan })
+}
+
+fn limit(seconds: f64) -> Result<Duration, Failure> {
+    let duration = Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero());
+    duration.ok_or_else(|| Failure::new("USAGE", format!("--time-limit is {seconds}, expected a positive number of seconds")))
+}
+
+fn blank_report(
+    args: &Solve,
+    seed: u64,
+    map: &MapFile,
+    workspace: &Workspace,
+    built: &Built,
+    options_available: usize,
+) -> SolveReport {
+    SolveReport {
+        schema: "sharp.solve/1",
+        status: "no_plan",
+        reason: None,
+        robot: workspace.robot.name.clone(),
+        options: sharp_plan::kind_name(built.file.kind),
+        learning: match args.learning {
+            Learning::Fast => "fast",
+            Learning::Paper => "paper",
+        },
+        noise: args.noise.clone(),
+        seed,
+        map: MapReport::new(&map.name, &map.grid),
+        regions: built.source.clone(),
+        states: built.file.rbvd.len(),
+        options_available,
+        plan: vec![],
+        reuse: Reuse { uses: 0, reused: 0 },
+        predicted: None,
+        time_s: SolveTimes::default(),
+        plan_dir: None,
+    }
+}
+
+/// The folder asked for, or a fresh one.
+fn plan_folder(args: &Solve, map: &MapFile, workspace: &Workspace) -> Result<PathBuf, Failure> {
+    if let Some(folder) = &args.out {
+        return Ok(folder.clone());
+    }
+    let problem = args.problem.map_or(String::new(), |number| format!("-p{number}"));
+    let kind = sharp_plan::kind_name(args.abstraction.options.into());
+    let stem = format!("{}{problem}-{}-{kind}", map.name, workspace.robot.name);
+    let root = Path::new("sharp-plans");
+    (1..100_000)
+        .map(|number| root.join(format!("{stem}-{number}")))
+        .find(|folder| !folder.exists())
+        .ok_or_else(|| Failure::new("FILE_INVALID", "sharp-plans is full, name a folder with --out"))
+}
+
+fn write_plan(
+    plan: &Plan,
+    folder: &Path,
+    built: &Built,
+    query: &Query,
+    report: &SolveReport,
+) -> Result<(), Failure> {
+    plan.save(folder, &built.file)?;
+    sharp_maps::save_ros(&plan.workspace.grid, &folder.join("map.yaml"))?;
+    if let Some(heatmap) = &built.heatmap {
+        pictures::write(folder, "regions", &pictures::regions(&plan.workspace.grid, heatmap, &built.file.rbvd))?;
+    }
+    pictures::write(folder, "abstraction", &pictures::abstraction(&plan.workspace.grid, &plan.abstraction))?;
+    pictures::write(folder, "plan", &pictures::plan(plan, query, &[]))?;
+    write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;
+    Ok(())
+}
+
+fn print_report(report: &SolveReport) {
+    say!(
+        "{}: {} on map {}, {} options, {} noise, {} learning",
+        report.status, report.robot, report.map.name, report.options, report.noise, report.learning
+    );
+    say!("{} abstract states (regions: {}), {} options", report.states, report.regions, report.options_available);
+    if let Some(reason) = &report.reason {
+        say!("{reason}");
+    }
+    for leg in &report.plan {
+        say!(
+            "  {:<14} {:>5.1} m {:>5.1} s  holds {:>4}/{:<4} on arrival  {}{}",
+            leg.option,
+            leg.length_m,
+            leg.cost_s,
+            leg.on_arrival.successes,
+            leg.on_arrival.episodes,
+            leg.policy,
+            if leg.reused { ", reused" } else { "" }
+        );
+    }
+    if let Some(predicted) = &report.predicted {
+        say!(
+            "predicted success {:.1} % (at least {:.1} %), {:.1} s of driving; reused {} of {} options",
+            100.0 * predicted.success,
+            100.0 * predicted.lower95,
+            predicted.sim_time_s,
+            report.reuse.reused,
+            report.reuse.uses
+        );
+    }
+    let time = &report.time_s;
+    say!(
+        "took {:.1} s: regions {:.1}, abstraction {:.1}, search {:.1}, guides {:.1}, learning {:.1}, verification {:.1}",
+        time.total, time.regions, time.abstraction, time.search, time.guide, time.learn, time.verify
+    );
+    if let Some(folder) = &report.plan_dir {
+        say!("plan written to {folder}; next: sharp run {folder}");
+    }
+}

@@ -1,0 +1,118 @@
+//! How a command ends: exit codes and the error object.
+
+use std::fmt;
+
+use serde::Serialize;
+use sharp_maps::MapError;
+use sharp_plan::FileError;
+use sharp_sim::{NoiseError, RobotError};
+
+/// Exit codes of the command, the same for every subcommand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Exit {
+    /// Done.
+    Done = 0,
+    /// Asked, and the answer is no.
+    No = 1,
+    /// Broken input or use.
+    Broken = 2,
+    /// Interrupted, after saving what there was.
+    Interrupted = 130,
+}
+
+/// Broken input: what is wrong, where, and what would be right.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    code: &'static str,
+    message: String,
+}
+
+/// Names and numbers of Nav2's planner errors.
+const NAV2: [(&str, u16); 6] = [
+    ("START_OUTSIDE_MAP", 203),
+    ("GOAL_OUTSIDE_MAP", 204),
+    ("START_OCCUPIED", 205),
+    ("GOAL_OCCUPIED", 206),
+    ("TIMEOUT", 207),
+    ("NO_VALID_PATH", 208),
+];
+
+#[derive(Serialize)]
+struct ErrorReport<'a> {
+    schema: &'static str,
+    error: ErrorBody<'a>,
+}
+
+#[derive(Serialize)]
+struct ErrorBody<'a> {
+    code: &'a str,
+    nav2: Option<u16>,
+    message: &'a str,
+}
+
+impl Failure {
+    pub(crate) fn new(code: &'static str, message: impl fmt::Display) -> Self {
+        Self { code, message: message.to_string() }
+    }
+
+    /// The error object of `--json`.
+    pub(crate) fn to_json(&self) -> String {
+        let nav2 = NAV2.iter().find(|(name, _)| *name == self.code).map(|&(_, number)| number);
+        let error = ErrorBody { code: self.code, nav2, message: &self.message };
+        to_json(&ErrorReport { schema: "sharp.error/1", error })
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl From<MapError> for Failure {
+    fn from(error: MapError) -> Self {
+        Self::new(error.code(), error)
+    }
+}
+
+impl From<RobotError> for Failure {
+    fn from(error: RobotError) -> Self {
+        Self::new("ROBOT_INVALID", error)
+    }
+}
+
+impl From<NoiseError> for Failure {
+    fn from(error: NoiseError) -> Self {
+        Self::new("NOISE_INVALID", error)
+    }
+}
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
+        Self::new("FILE_INVALID", error)
+    }
+}
+
+impl From<anyhow::Error> for Failure {
+    fn from(error: anyhow::Error) -> Self {
+        Self::new("FAILED", format!("{error:#}"))
+    }
+}
+
+/// `value` as one line of JSON.
+pub(crate) fn to_json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("reports have string keys and finite numbers")
+}
+
+/// Prints a line on stdout; a reader that has gone away is no error.
+macro_rules! say {
+    ($($part:tt)*) => {
+        $crate::outcome::print_line(format_args!($($part)*))
+    };
+}
+pub(crate) use say;
+
+pub(crate) fn print_line(line: fmt::Arguments<'_>) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stdout(), "{line}");
+}

@@ -1,0 +1,159 @@
+//! Lines 1 to 7 of Algorithm 1: regions, diagram and options of one map for one robot.
+
+use std::path::{Path, PathBuf};
+
+use sharp_options::{OptionKind, OptionSettings};
+use sharp_plan::{AbstractionFile, FORMAT, OptionLibrary, Workspace, hash, map_hash};
+use sharp_rbvd::{CellMetric, Rbvd, RbvdSettings};
+use sharp_regions::{Heatmap, PredictSettings, RegionPredictor, Source, predict_regions};
+use sharp_sim::NoiseModel;
+use sharp_space::{Cell, Region, RegionId};
+
+use crate::args::{AbstractionArgs, Kind, Learning, Metric};
+use crate::input::read_text;
+use crate::outcome::Failure;
+use crate::progress::Stopwatch;
+
+/// What the abstraction of one map consists of.
+#[derive(Debug)]
+pub(crate) struct Built {
+    /// Diagram and option settings, as they are kept in a file.
+    pub(crate) file: AbstractionFile,
+    /// Where the regions came from: net, geometric or a file.
+    pub(crate) source: String,
+    /// The heat map, unless the abstraction was loaded or the regions came from a file.
+    pub(crate) heatmap: Option<Heatmap>,
+    /// True if a library had it already.
+    pub(crate) loaded: bool,
+}
+
+impl From<Kind> for OptionKind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Centroid => Self::Centroid,
+            Kind::Interface => Self::Interface,
+        }
+    }
+}
+
+/// The abstraction for `args`, from `cache` if it holds it, and kept there.
+pub(crate) fn abstraction(
+    workspace: &Workspace,
+    args: &AbstractionArgs,
+    cache: Option<&Path>,
+    stopwatch: &mut Stopwatch,
+) -> Result<Built, Failure> {
+    let map = map_hash(&workspace.grid);
+    let path = cache.map(|folder| folder.join(cache_name(args)));
+    if let Some(path) = path.as_deref().filter(|path| path.exists()) {
+        stopwatch.enter("abstraction");
+        let file = AbstractionFile::load(path, &map)?;
+        stopwatch.stop();
+        return Ok(Built { source: file.regions.clone(), file, heatmap: None, loaded: true });
+    }
+    stopwatch.enter("regions");
+    let (heatmap, regions, source) = regions(workspace, &args.regions)?;
+    stopwatch.enter("abstraction");
+    let rbvd = diagram(workspace, &regions, args.metric)?;
+    let settings = OptionSettings::for_robot(workspace.robot.goal_tolerance_m);
+    let file = AbstractionFile::new(map, source.clone(), args.options.into(), settings, rbvd);
+    if let Some(path) = path {
+        file.save(&path)?;
+    }
+    stopwatch.stop();
+    Ok(Built { file, source, heatmap, loaded: false })
+}
+
+fn cache_name(args: &AbstractionArgs) -> String {
+    let regions = match args.regions.as_str() {
+        name @ ("net" | "geometric") => name.to_owned(),
+        file => hash(std::fs::read(file).unwrap_or_default().as_slice())[..8].to_owned(),
+    };
+    format!("abstraction-{:?}-{:?}-{regions}.ron", args.options, args.metric).to_lowercase()
+}
+
+/// Critical regions as `choice` asks for them, with the name of their source.
+pub(crate) fn regions(
+    workspace: &Workspace,
+    choice: &str,
+) -> Result<(Option<Heatmap>, Vec<Region>, String), Failure> {
+    let settings = PredictSettings::default();
+    let footprint = &workspace.robot.footprint;
+    let predictor = match choice {
+        "net" => Some(RegionPredictor::shipped_for(footprint)),
+        "geometric" => None,
+        file => {
+            let regions = regions_from_file(workspace, file)?;
+            return Ok((None, regions, file.to_owned()));
+        }
+    };
+    let prediction = predict_regions(&workspace.grid, footprint, predictor.as_ref(), &settings);
+    let source = match prediction.source {
+        Source::Network => "net",
+        Source::Geometric => "geometric",
+    };
+    Ok((Some(prediction.heatmap), prediction.regions, source.to_owned()))
+}
+
+/// A region of one cell's neighbourhood around each centre listed in a file.
+fn regions_from_file(workspace: &Workspace, file: &str) -> Result<Vec<Region>, Failure> {
+    let broken = |problem: String| Failure::new("REGIONS_INVALID", format!("{file}: {problem}"));
+    let text = read_text(file, "regions", "net, geometric or a file")?;
+    let centers: Vec<(f64, f64)> = ron::from_str(&text).map_err(|error| broken(error.to_string()))?;
+    let frame = workspace.grid.frame();
+    let field = workspace.checker.field();
+    let least_m = workspace.robot.footprint.inscribed_radius_m();
+    let mut regions = Vec::with_capacity(centers.len());
+    for (index, &(x, y)) in centers.iter().enumerate() {
+        let cell = frame.cell_at(sharp_space::Point::new(x, y)).filter(|&cell| field.at(cell) >= least_m);
+        let cell = cell.ok_or_else(|| broken(format!("entry {index} is ({x}, {y}), expected a place with room for the robot")))?;
+        let around: Vec<Cell> = std::iter::once(cell)
+            .chain(frame.neighbors8(cell).filter(|&cell| field.at(cell) >= least_m))
+            .collect();
+        regions.extend(Region::new(RegionId(index as u32), around, field));
+    }
+    Ok(regions)
+}
+
+fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
+    let resolution_m = workspace.grid.frame().resolution_m;
+    let mut settings = RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m);
+    if metric == Metric::Paper {
+        settings.metric = CellMetric::Euclidean;
+    }
+    Rbvd::build(workspace.checker.field(), regions, &settings)
+        .map_err(|error| Failure::new("NO_FREE_SPACE", format!("map has no room for the {}: {error}", workspace.robot.name)))
+}
+
+/// The library for `choice` ("none", a folder, or by default a cache folder), opened for this world.
+pub(crate) fn library(
+    choice: Option<&str>,
+    workspace: &Workspace,
+    noise: &NoiseModel,
+    learning: Learning,
+) -> Result<OptionLibrary, Failure> {
+    let root = match choice {
+        Some("none") => return Ok(OptionLibrary::in_memory()),
+        Some(folder) => PathBuf::from(folder),
+        None => cache_folder(),
+    };
+    Ok(OptionLibrary::open(&root, &library_key(workspace, noise, learning))?)
+}
+
+/// Options learnt in one world say nothing about another: the key names map, robot, noise, mode and format.
+fn library_key(workspace: &Workspace, noise: &NoiseModel, learning: Learning) -> String {
+    let world = format!(
+        "{} {:?} {noise:?} {learning:?} {FORMAT}",
+        map_hash(&workspace.grid),
+        workspace.robot
+    );
+    format!("{}-{}", workspace.robot.name, &hash(world.as_bytes())[..16])
+}
+
+fn cache_folder() -> PathBuf {
+    let set = |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    set("XDG_CACHE_HOME")
+        .or_else(|| set("HOME").map(|home| home.join(".cache")))
+        .unwrap_or_else(std::env::temp_dir)
+        .join("sharp")
+}

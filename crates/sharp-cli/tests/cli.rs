@@ -1,0 +1,175 @@
+//! The command as a user meets it: exit codes, messages, files, and equal bytes for equal seeds.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+fn sharp(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sharp"))
+        .args(args)
+        .current_dir(folder)
+        .env("XDG_CACHE_HOME", folder.join("cache"))
+        .output()
+        .expect("the binary runs")
+}
+
+fn json(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    serde_json::from_str(&text).unwrap_or_else(|error| {
+        panic!("{error} in {text:?}, stderr {:?}", String::from_utf8_lossy(&output.stderr))
+    })
+}
+
+/// Two rooms of 6 x 6 m and a door of 1.4 m, at 0.1 m a cell, as a plain PGM.
+fn write_rooms(folder: &Path, door: bool) {
+    let (width, height) = (122, 62);
+    let mut pixels = format!("P5\n{width} {height}\n255\n").into_bytes();
+    for row in 0..height {
+        for col in 0..width {
+            let border = row == 0 || col == 0 || row == height - 1 || col == width - 1;
+            let wall = (60..62).contains(&col) && !(door && (24..38).contains(&row));
+            pixels.push(if border || wall { 0 } else { 254 });
+        }
+    }
+    fs::write(folder.join("rooms.pgm"), pixels).unwrap();
+    fs::write(
+        folder.join("rooms.yaml"),
+        "image: rooms.pgm\nresolution: 0.1\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+    )
+    .unwrap();
+}
+
+const ACROSS: [&str; 6] = ["--start", "2.0,3.0,0.0", "--goal", "10.0,3.5,0.0", "--regions", "geometric"];
+
+fn solve_rooms(folder: &Path, extra: &[&str]) -> Output {
+    let args = [&["--json", "solve", "rooms.yaml"], &ACROSS[..], extra].concat();
+    sharp(folder, &args)
+}
+
+#[test]
+fn broken_input_gives_exit_2_and_names_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    fs::write(folder.path().join("lost.yaml"), "image: gone.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n").unwrap();
+    fs::write(folder.path().join("full.pgm"), [&b"P5\n50 50\n255\n"[..], &[0; 2500]].concat()).unwrap();
+    fs::write(folder.path().join("robot.ron"), "(name: \"x\")").unwrap();
+    let cases: [(&[&str], &str, &str); 10] = [
+        (&["solve", "rooms.yaml", "--start", "2,3,0", "--goal", "6.05,1,0"], "GOAL_OCCUPIED", "goal"),
+        (&["solve", "rooms.yaml", "--start", "-2,3,0", "--goal", "10,3,0"], "START_OUTSIDE_MAP", "start"),
+        (&["solve", "rooms.yaml", "--start", "2,NaN,0", "--goal", "10,3,0"], "POSE_INVALID", "--start"),
+        (&["solve", "rooms.yaml", "--start", "0.3,3,1.57", "--goal", "10,3,0"], "START_OCCUPIED", "nearest"),
+        (&["solve", "lost.yaml", "--start", "1,1,0", "--goal", "2,2,0"], "", "gone.pgm"),
+        (&["solve", "nowhere.yaml", "--start", "1,1,0", "--goal", "2,2,0"], "", "nowhere.yaml"),
+        (&["solve", "full.pgm", "--resolution", "0.1", "--start", "1,1,0", "--goal", "2,2,0"], "START_OCCUPIED", "start"),
+        (&["solve", "a", "--problem", "9"], "PROBLEM_UNKNOWN", "1..5"),
+        (&["map", "check", "rooms.yaml", "--robot", "robot.ron"], "ROBOT_INVALID", "robot.ron"),
+        (&["run", "missing"], "", "missing"),
+    ];
+    for (args, code, named) in cases {
+        let output = sharp(folder.path(), &[&["--json"], args].concat());
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {output:?}");
+        let error = &json(&output)["error"];
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains(named), "{args:?}: {message}");
+        assert!(code.is_empty() || error["code"] == code, "{args:?}: {error}");
+        assert!(!String::from_utf8_lossy(&output.stderr).contains("panicked"), "{args:?} panicked");
+    }
+}
+
+#[test]
+fn a_goal_behind_a_wall_is_a_no_with_a_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), false);
+    let output = solve_rooms(folder.path(), &["--library", "none"]);
+    let report = json(&output);
+    assert_eq!(output.status.code(), Some(1), "{report}");
+    assert_eq!(report["status"], "no_plan");
+    assert!(report["reason"].as_str().is_some_and(|reason| !reason.is_empty()), "{report}");
+}
+
+#[test]
+fn a_solved_plan_runs_serves_and_repeats_byte_for_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    for (threads, out) in [("1", "one"), ("2", "two")] {
+        let output = solve_rooms(folder.path(), &["--library", "none", "--threads", threads, "--out", out]);
+        assert_eq!(output.status.code(), Some(0), "{:?}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(json(&output)["status"], "solved");
+    }
+    let files = |name: &str| {
+        let mut files: Vec<_> = fs::read_dir(folder.path().join(name))
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .filter(|path| !path.ends_with("solve.json"))
+            .map(|path| (path.file_name().unwrap().to_owned(), fs::read(&path).unwrap()))
+            .collect();
+        files.sort();
+        files
+    };
+    let (one, two) = (files("one"), files("two"));
+    assert_eq!(one.len(), two.len(), "the same files");
+    for (a, b) in one.iter().zip(&two) {
+        assert!(a == b, "{:?} differs between 1 and 2 threads", a.0);
+    }
+
+    let run = json(&sharp(folder.path(), &["--json", "run", "one", "--episodes", "20"]));
+    assert!(run["successes"].as_u64() >= Some(18), "{run}");
+    let again = json(&sharp(folder.path(), &["--json", "--threads", "1", "run", "two", "--episodes", "20"]));
+    for key in ["successes", "collisions", "mean_sim_time_s", "mean_path_m", "strays"] {
+        assert_eq!(run[key], again[key], "{key}");
+    }
+}
+
+#[test]
+fn a_library_is_reused_and_a_damaged_one_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let first = json(&solve_rooms(folder.path(), &["--library", "lib", "--options", "centroid"]));
+    let second = json(&solve_rooms(folder.path(), &["--library", "lib", "--options", "centroid"]));
+    assert_eq!(first["reuse"]["reused"], 0, "{first}");
+    assert_eq!(second["reuse"]["reused"], second["reuse"]["uses"], "{second}");
+    assert!(sharp(folder.path(), &["library", "check", "lib"]).status.success(), "a sound library");
+
+    let world = fs::read_dir(folder.path().join("lib")).unwrap().next().unwrap().unwrap().path();
+    let option = fs::read_dir(&world).unwrap().map(|entry| entry.unwrap().path());
+    let Some(option) = option.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with("c_"))
+    else {
+        assert_eq!(second["reuse"]["uses"], 0, "a plan with options leaves them in the library");
+        return;
+    };
+    let mut bytes = fs::read(&option).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&option, bytes).unwrap();
+    let output = sharp(folder.path(), &["--json", "library", "check", "lib"]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let message = json(&output)["error"]["message"].to_string();
+    assert!(message.contains(option.file_name().unwrap().to_str().unwrap()), "{message}");
+}
+
+#[test]
+fn serve_answers_every_line() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    assert!(solve_rooms(folder.path(), &["--library", "none", "--out", "plan"]).status.success(), "solved");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sharp"))
+        .args(["serve", "plan"])
+        .current_dir(folder.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = "{\"pose\":[2.0,3.0,0.0]}\nnonsense\n{\"pose\":[2.2,3.0,0.0]}\n{\"pose\":[10.0,3.5,0.0]}\n";
+    child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let replies: Vec<Value> =
+        String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(replies.len(), 4, "{replies:?}");
+    assert_eq!(replies[0]["status"], "running");
+    assert!(replies[0]["waypoint"][0].as_f64() > Some(2.0), "ahead: {}", replies[0]);
+    assert_eq!(replies[1]["schema"], "sharp.error/1");
+    assert_eq!(replies[2]["status"], "running");
+}

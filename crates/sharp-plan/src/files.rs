@@ -1,0 +1,160 @@
+//! Files that are never half written and never silently damaged.
+//!
+//! Text files open with a line `// blake3: <hash of the rest>`; binary files are named by the hash
+//! of their content. Both are written to a temporary name in the same folder and then renamed.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use thiserror::Error;
+
+const PREFIX: &str = "// blake3: ";
+
+/// Why a file of a library or a plan could not be used.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum FileError {
+    /// The system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The content does not match its checksum.
+    #[error("{}: damaged: its content does not match its checksum", path.display())]
+    Checksum {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The content cannot be understood.
+    #[error("{}: {problem}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+impl FileError {
+    pub(crate) fn content(path: &Path, problem: impl ToString) -> Self {
+        Self::Content { path: path.to_owned(), problem: problem.to_string() }
+    }
+}
+
+fn io(path: &Path) -> impl FnOnce(std::io::Error) -> FileError {
+    let path = path.to_owned();
+    |source| FileError::Io { path, source }
+}
+
+/// The hash of `bytes` as hexadecimal text.
+#[must_use]
+pub fn hash(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
+}
+
+/// Writes `bytes` to `path` so that a reader sees the old content or the new, never a mix.
+///
+/// # Errors
+/// Returns an error that names the file if the folder cannot be made or written.
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(io(folder))?;
+    let mut file = tempfile::Builder::new().suffix(".tmp").tempfile_in(folder).map_err(io(folder))?;
+    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(io(path))?;
+    file.persist(path).map_err(|error| io(path)(error.error))?;
+    Ok(())
+}
+
+/// Writes `value` as RON with a checksum.
+///
+/// # Errors
+/// Returns an error that names the file if it cannot be written.
+pub fn write_ron<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
+    let config = ron::ser::PrettyConfig::new().depth_limit(3).compact_arrays(true).new_line("\n");
+    let text = ron::ser::to_string_pretty(value, config).map_err(|error| FileError::content(path, error))? + "\n";
+    write_atomic(path, format!("{PREFIX}{}\n{text}", hash(text.as_bytes())).as_bytes())
+}
+
+/// Reads what [`write_ron`] wrote.
+///
+/// # Errors
+/// Returns an error that names the file if it is missing, damaged or of another shape.
+pub fn read_ron<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
+    let text = String::from_utf8(fs::read(path).map_err(io(path))?)
+        .map_err(|_| FileError::Checksum { path: path.to_owned() })?;
+    let (head, body) = text.split_once('\n').unwrap_or(("", ""));
+    if head.strip_prefix(PREFIX) != Some(hash(body.as_bytes()).as_str()) {
+        return Err(FileError::Checksum { path: path.to_owned() });
+    }
+    ron::from_str(body).map_err(|error| FileError::content(path, error))
+}
+
+/// Writes `bytes` into `folder` under the name of their hash and returns that name.
+///
+/// # Errors
+/// Returns an error that names the file if it cannot be written.
+pub fn write_blob(folder: &Path, bytes: &[u8], ending: &str) -> Result<String, FileError> {
+    let name = format!("{}.{ending}", &hash(bytes)[..32]);
+    let path = folder.join(&name);
+    if !path.exists() {
+        write_atomic(&path, bytes)?;
+    }
+    Ok(name)
+}
+
+/// Reads what [`write_blob`] wrote.
+///
+/// # Errors
+/// Returns an error that names the file if it is missing, damaged or not a plain name in `folder`.
+pub fn read_blob(folder: &Path, name: &str) -> Result<Vec<u8>, FileError> {
+    let path = folder.join(name);
+    let stem = name.split('.').next().unwrap_or("");
+    if stem.len() != 32 || !stem.bytes().all(|byte| byte.is_ascii_hexdigit()) || name.contains(['/', '\\']) {
+        return Err(FileError::content(&path, "not the name of a weights file"));
+    }
+    let bytes = fs::read(&path).map_err(io(&path))?;
+    if !hash(&bytes).starts_with(stem) {
+        return Err(FileError::Checksum { path });
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_flipped_byte_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("value.ron");
+        write_ron(&path, &vec![1.5, 2.5]).unwrap();
+        assert_eq!(read_ron::<Vec<f64>>(&path).unwrap(), [1.5, 2.5]);
+        let bytes = fs::read(&path).unwrap();
+        for index in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[index] ^= 1;
+            fs::write(&path, damaged).unwrap();
+            assert!(read_ron::<Vec<f64>>(&path).is_err(), "byte {index} was flipped unnoticed");
+        }
+        let blob = write_blob(folder.path(), &[1, 2, 3], "bin").unwrap();
+        fs::write(folder.path().join(&blob), [1, 2, 4]).unwrap();
+        assert!(matches!(read_blob(folder.path(), &blob), Err(FileError::Checksum { .. })), "damaged blob");
+        assert!(read_blob(folder.path(), "../../etc/passwd").is_err(), "path traversal");
+    }
+
+    #[test]
+    fn nothing_is_left_behind_when_a_folder_is_read_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let blocker = folder.path().join("file");
+        fs::write(&blocker, "x").unwrap();
+        let error = write_atomic(&blocker.join("below"), b"y").unwrap_err();
+        assert!(error.to_string().contains("file"), "{error} names the path");
+        assert_eq!(fs::read(&blocker).unwrap(), b"x", "the old content stays");
+    }
+}

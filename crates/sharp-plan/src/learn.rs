@@ -1,0 +1,278 @@
+//! Learning the policy of one leg (Algorithm 1, lines 11, 16 and 19).
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use sharp_guide::{Place, PseudoReward, ShapedReward, StepEvents};
+use sharp_rl::{Progress, StopRule, TrainError, TrainSettings, train};
+use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, Vehicle};
+use sharp_space::{Pose, Seed};
+
+use crate::certify::{Certificate, Trial};
+use crate::leg::Leg;
+use crate::percept::{Tracker, Workspace};
+use crate::policy::{Correction, Follower, Form, OptionPolicy};
+use crate::starts::Starts;
+use crate::stats::Tally;
+use crate::task::LegTask;
+
+/// How policies are learnt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LearningMode {
+    /// In the guide's frame: certified followers first, a learnt correction where none holds.
+    Fast,
+    /// The paper's protocol.
+    Paper,
+}
+
+/// Budgets and levels of learning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LearnSettings {
+    /// The mode.
+    pub mode: LearningMode,
+    /// Success wanted of an option, share of episodes.
+    pub wanted_success: f64,
+    /// Episodes in which candidates are compared.
+    pub screening_episodes: u32,
+    /// Fresh episodes that certify the chosen one.
+    pub certify_episodes: u32,
+    /// Environments that learn side by side.
+    pub environments: u64,
+    /// Soft actor-critic, its budget and its stop rule.
+    pub train: TrainSettings,
+}
+
+impl LearnSettings {
+    /// The settings of `mode`.
+    #[must_use]
+    pub fn new(mode: LearningMode) -> Self {
+        match mode {
+            LearningMode::Fast => Self {
+                mode,
+                wanted_success: 0.99,
+                screening_episodes: 200,
+                certify_episodes: 1000,
+                environments: 16,
+                train: TrainSettings {
+                    max_env_steps: 16_000,
+                    stop: StopRule::Success { rate: 0.995, episodes: 400 },
+                    ..TrainSettings::fast()
+                },
+            },
+            // Section 5: at most 150 k steps, 20 evaluation episodes each 10 k, one environment.
+            LearningMode::Paper => Self {
+                mode,
+                wanted_success: 0.99,
+                screening_episodes: 20,
+                certify_episodes: 1000,
+                environments: 1,
+                train: TrainSettings::default(),
+            },
+        }
+    }
+}
+
+/// A policy and what was measured of it.
+#[derive(Clone, Debug)]
+pub struct Learnt {
+    /// The policy.
+    pub policy: OptionPolicy,
+    /// Fresh episodes that certify it.
+    pub verified: Tally,
+    /// Mean simulated time of a successful episode, seconds.
+    pub mean_time_s: f64,
+    /// Environment steps that learning took.
+    pub env_steps: u64,
+    /// Gradient steps that learning took.
+    pub gradient_steps: u64,
+}
+
+impl Learnt {
+    /// The cost that A* uses: seconds per success, and a price for each failure.
+    ///
+    /// The paper takes the mean number of steps and knows no failure; a minute is what recovering
+    /// from one costs at least.
+    #[must_use]
+    pub fn cost_s(&self) -> f64 {
+        let success = self.verified.rate().max(1e-3);
+        self.mean_time_s / success + 60.0 * (1.0 - success)
+    }
+}
+
+/// Why a leg has no policy.
+#[derive(Debug)]
+pub enum LearnFailure {
+    /// The caller asked to stop.
+    Stopped,
+    /// Something was wrong with the task: a NaN, an impossible observation.
+    Broken(TrainError),
+}
+
+/// Which pseudo-reward teaches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RewardMode {
+    /// Definition 8; contact blocks the robot and the episode goes on.
+    Paper(PseudoReward),
+    /// Progress along the guide; contact ends the episode.
+    Shaped(ShapedReward),
+}
+
+impl RewardMode {
+    /// Returns true if an episode ends when the robot touches a wall.
+    #[must_use]
+    pub const fn contact_ends(&self) -> bool {
+        matches!(self, Self::Shaped(_))
+    }
+
+    /// The reward of an action that moved the robot to `pose` and its projection from `trackers.0`
+    /// to `trackers.1`.
+    #[must_use]
+    pub fn of(&self, leg: &Leg, pose: &Pose, trackers: (&Tracker, &Tracker), contact: bool, success: bool) -> f64 {
+        let stray = !leg.is_allowed(pose);
+        match self {
+            Self::Paper(reward) => {
+                let place = match (success, stray) {
+                    (true, _) => Place::Termination,
+                    (false, true) => Place::Astray,
+                    (false, false) => Place::Allowed,
+                };
+                reward.value(&leg.guide, pose, place)
+            }
+            Self::Shaped(reward) => {
+                let (before, after) = trackers;
+                let deviation_m = after.cross_track_m.abs() - before.cross_track_m.abs();
+                reward.value(after.arc_m - before.arc_m, deviation_m, StepEvents { success, contact, stray })
+            }
+        }
+    }
+}
+
+/// A vehicle in the kinematic simulator; its actions end at contact if `stop_at_contact`.
+pub(crate) fn kinematic_vehicle(
+    workspace: &Workspace,
+    noise: &NoiseModel,
+    stop_at_contact: bool,
+) -> Vehicle<KinematicSim> {
+    let settings = ActionSettings { stop_at_contact, ..ActionSettings::default() };
+    let sim = KinematicSim::new(Arc::clone(&workspace.world), &workspace.robot);
+    Vehicle::new(sim, Arc::clone(&workspace.robot), noise.clone(), settings)
+}
+
+/// One leg to be learnt.
+#[derive(Clone, Debug)]
+pub struct Lesson<'a> {
+    /// Map and robot.
+    pub workspace: &'a Workspace,
+    /// The leg.
+    pub leg: &'a Arc<Leg>,
+    /// Where its episodes begin.
+    pub starts: Arc<Starts>,
+    /// The noise of the simulator.
+    pub noise: &'a NoiseModel,
+    /// Budgets and levels.
+    pub settings: &'a LearnSettings,
+    /// The root of the lesson's random streams.
+    pub seed: Seed,
+}
+
+impl Lesson<'_> {
+    /// Learns a policy; `stop` is asked now and then whether to give up.
+    ///
+    /// # Errors
+    /// Says whether it was stopped or what broke. A policy that merely falls short is returned with
+    /// its certificate: the planner decides what it is worth.
+    pub fn learn(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+        match self.settings.mode {
+            LearningMode::Fast => self.learn_fast(stop),
+            LearningMode::Paper => self.learn_paper(stop),
+        }
+    }
+
+    fn trial(&self, episodes: u32, purpose: &str, index: u64) -> Trial<'_> {
+        Trial { workspace: self.workspace, noise: self.noise, episodes, seed: self.seed.child(purpose, index) }
+    }
+
+    fn certify(&self, policy: &OptionPolicy) -> Certificate {
+        self.trial(self.settings.certify_episodes, "certify", 0).of_leg(self.leg, policy, &self.starts)
+    }
+
+    fn learn_fast(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+        let mut screened = self.screen();
+        screened.sort_by(|a, b| a.1.mean_time_s.total_cmp(&b.1.mean_time_s));
+        let passes = |certificate: &Certificate| certificate.tally.rate() >= self.settings.wanted_success;
+        for (follower, _) in screened.iter().filter(|(_, certificate)| passes(certificate)) {
+            if stop() {
+                return Err(LearnFailure::Stopped);
+            }
+            let policy = OptionPolicy::Follower(*follower);
+            let certificate = self.certify(&policy);
+            if passes(&certificate) {
+                return Ok(learnt(policy, certificate, (0, 0)));
+            }
+        }
+        // None holds: the follower with the best odds becomes the base of a learnt correction.
+        let odds = |entry: &&(Follower, Certificate)| entry.1.tally.successes;
+        let best = screened.iter().max_by_key(odds).map(|entry| entry.0).expect("there are candidates");
+        let learnt_correction = self.learn_correction(best, stop)?;
+        let fallback_policy = OptionPolicy::Follower(best);
+        let fallback = self.certify(&fallback_policy);
+        if fallback.tally.successes >= learnt_correction.verified.successes {
+            let effort = (learnt_correction.env_steps, learnt_correction.gradient_steps);
+            return Ok(learnt(fallback_policy, fallback, effort));
+        }
+        Ok(learnt_correction)
+    }
+
+    fn screen(&self) -> Vec<(Follower, Certificate)> {
+        let trial = self.trial(self.settings.screening_episodes, "screen", 0);
+        Follower::candidates(&self.workspace.robot)
+            .into_iter()
+            .map(|follower| (follower, trial.of_leg(self.leg, &OptionPolicy::Follower(follower), &self.starts)))
+            .collect()
+    }
+
+    fn learn_correction(&self, base: Follower, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+        let robot = &self.workspace.robot;
+        // A car corrects less: at full lock noise on a good base costs more than it teaches.
+        let (reach, bearing_rad) = if robot.can_turn_in_place() { (0.8, 1.0) } else { (0.4, 0.5) };
+        let correction = Correction { reach_m: reach * robot.waypoint_reach_m, bearing_rad };
+        self.learn_sac(Form::Guide { base, correction }, RewardMode::Shaped(ShapedReward::default()), stop)
+    }
+
+    fn learn_paper(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+        let form = Form::Absolute { reach_m: self.workspace.robot.waypoint_reach_m };
+        self.learn_sac(form, RewardMode::Paper(PseudoReward::default()), stop)
+    }
+
+    fn learn_sac(
+        &self,
+        form: Form,
+        reward: RewardMode,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Learnt, LearnFailure> {
+        let task = |index| {
+            let starts = Arc::clone(&self.starts);
+            let noise = (self.noise, self.seed.child("environment", index));
+            LegTask::new(self.workspace, Arc::clone(self.leg), form, reward, starts, noise)
+        };
+        let mut tasks: Vec<LegTask> = (0..self.settings.environments).map(task).collect();
+        let mut observer = |_: &Progress<'_>| {
+            if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let mut rng = self.seed.stream("sac", 0);
+        let trained = train(&mut tasks, &self.settings.train, &mut rng, &mut observer).map_err(LearnFailure::Broken)?;
+        if stop() {
+            return Err(LearnFailure::Stopped);
+        }
+        let policy = OptionPolicy::Learnt { form, actor: Box::new(trained.actor) };
+        let certificate = self.certify(&policy);
+        Ok(learnt(policy, certificate, (trained.env_steps, trained.updates)))
+    }
+}
+
+fn learnt(policy: OptionPolicy, certificate: Certificate, (env_steps, gradient_steps): (u64, u64)) -> Learnt {
+    let Certificate { tally, mean_time_s } = certificate;
+    Learnt { policy, verified: tally, mean_time_s, env_steps, gradient_steps }
+}

@@ -1,0 +1,179 @@
+//! Legs of a plan: an option, or the special cases π_0 and π_{n+1} at either end.
+
+use std::fmt;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use sharp_guide::GuidePath;
+use sharp_options::{AllowedRule, Endpoint, EndpointId, OptionId, OptionSet};
+use sharp_rbvd::{Rbvd, StateId};
+use sharp_space::{Point, Pose};
+
+/// What a leg is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// π_0: from the initial configuration to the first option, or straight to the goal.
+    First,
+    /// One of o_1 … o_n.
+    Option,
+    /// π_{n+1}: from the last option to the goal configuration.
+    Last,
+}
+
+/// Names a leg within a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum LegId {
+    /// From the initial configuration to the endpoint with this index.
+    First(u32),
+    /// An option.
+    Option(OptionId),
+    /// From the endpoint with this index, entered from the given state, to the goal configuration.
+    Last(u32, StateId),
+    /// From the initial to the goal configuration without any option.
+    Direct,
+}
+
+impl LegId {
+    /// What the leg is for.
+    #[must_use]
+    pub const fn role(&self) -> Role {
+        match self {
+            Self::First(_) | Self::Direct => Role::First,
+            Self::Option(_) => Role::Option,
+            Self::Last(..) => Role::Last,
+        }
+    }
+}
+
+impl fmt::Display for LegId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::First(endpoint) => write!(f, "first:{endpoint}"),
+            Self::Option(id) => write!(f, "{id}"),
+            Self::Last(endpoint, _) => write!(f, "last:{endpoint}"),
+            Self::Direct => f.write_str("first:goal"),
+        }
+    }
+}
+
+/// Where a leg ends.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Target {
+    /// An endpoint region β (definitions 2 and 4).
+    Endpoint(Endpoint),
+    /// The goal configuration, heading free.
+    Goal {
+        /// Its position.
+        point: Point,
+        /// How near counts as reached, metres.
+        radius_m: f64,
+    },
+}
+
+impl Target {
+    /// Returns true if a robot at `point` has arrived.
+    #[must_use]
+    pub fn contains(&self, point: Point, rbvd: &Rbvd) -> bool {
+        match self {
+            Self::Endpoint(endpoint) => endpoint.contains(point, rbvd),
+            Self::Goal { point: goal, radius_m } => (point - goal).norm() < *radius_m,
+        }
+    }
+
+    /// Its centre.
+    #[must_use]
+    pub const fn center(&self) -> Point {
+        match self {
+            Self::Endpoint(endpoint) => endpoint.center,
+            Self::Goal { point, .. } => *point,
+        }
+    }
+}
+
+/// A leg with its guide: what a policy is learnt for and runs in.
+#[derive(Clone, Debug)]
+pub struct Leg {
+    /// Its name.
+    pub id: LegId,
+    /// The state it leaves.
+    pub from: StateId,
+    /// The state it ends in.
+    pub to: StateId,
+    /// The guide path 𝒢 from the centre of its initiation set to that of its termination set.
+    pub guide: GuidePath,
+    /// Its termination set β.
+    pub target: Target,
+    /// Where it may be without straying.
+    pub allowed: Vec<StateId>,
+    /// Its initiation set, where it may be as well; `None` for a leg from a configuration.
+    pub source: Option<Endpoint>,
+    /// The abstraction it lives in.
+    pub rbvd: Arc<Rbvd>,
+}
+
+/// The goal of a problem: where, and how near is near enough, metres.
+pub(crate) type Goal = (Point, f64);
+
+impl Leg {
+    /// The leg called `id` from state `from` to state `to` along `guide`.
+    pub(crate) fn new(
+        (rbvd, options): (&Arc<Rbvd>, &OptionSet),
+        id: LegId,
+        (from, to): (StateId, StateId),
+        guide: GuidePath,
+        (point, radius_m): Goal,
+    ) -> Self {
+        let (source, target) = endpoints(options, id);
+        let goal = Target::Goal { point, radius_m };
+        Self {
+            id,
+            from,
+            to,
+            guide,
+            target: target.map_or(goal, |id| Target::Endpoint(options.endpoint(id).clone())),
+            allowed: allowed_states(id, from, to),
+            source: source.map(|id| options.endpoint(id).clone()),
+            rbvd: Arc::clone(rbvd),
+        }
+    }
+
+    /// Returns true if a robot at `pose` has finished the leg.
+    #[must_use]
+    pub fn is_done(&self, pose: &Pose) -> bool {
+        self.target.contains(pose.position, &self.rbvd)
+    }
+
+    /// Returns true if a robot at `pose` is where the leg may be: the complement of the second case
+    /// of definition 8. A point without a state (too near to a wall) does not count as straying.
+    #[must_use]
+    pub fn is_allowed(&self, pose: &Pose) -> bool {
+        let state = self.rbvd.state_at(pose.position);
+        state.is_none_or(|state| self.allowed.contains(&state))
+            || self.source.as_ref().is_some_and(|source| source.contains(pose.position, &self.rbvd))
+    }
+
+    /// Actions after which the leg counts as failed: ten, and three times what half speed needs.
+    #[must_use]
+    pub fn horizon_actions(&self, slowest_reach_m: f64) -> u32 {
+        10 + (3.0 * self.guide.length_m() / slowest_reach_m).ceil() as u32
+    }
+}
+
+/// The initiation and termination sets of the leg called `id`, where they are endpoints.
+pub(crate) fn endpoints(options: &OptionSet, id: LegId) -> (Option<EndpointId>, Option<EndpointId>) {
+    match id {
+        LegId::First(endpoint) => (None, Some(EndpointId(endpoint))),
+        LegId::Option(id) => options.get(id).map_or((None, None), |s| (Some(s.initiation), Some(s.termination))),
+        LegId::Last(endpoint, _) => (Some(EndpointId(endpoint)), None),
+        LegId::Direct => (None, None),
+    }
+}
+
+/// The states that the leg called `id` may use from end to end.
+pub(crate) fn allowed_states(id: LegId, from: StateId, to: StateId) -> Vec<StateId> {
+    match id {
+        LegId::Option(id) => AllowedRule::default().states(id).collect(),
+        LegId::First(_) | LegId::Last(..) | LegId::Direct => vec![from, to],
+    }
+}

@@ -1,0 +1,242 @@
+//! Search and guides together: legs get their guide only when a plan wants them.
+//!
+//! Costs begin as lower bounds. Whenever A* returns a plan, its legs without a guide are guided and
+//! their costs become exact, or infinite where no guide exists; then A* runs again, until a plan
+//! consists of guided legs only. That plan is as cheap as if every leg had been guided beforehand,
+//! and a leg that cannot be guided has lost its edge: the repair that downward refinability needs.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, NoGuide, plan_guide};
+use sharp_motion::Steering;
+use sharp_options::{Endpoint, OptionSet};
+use sharp_rbvd::{Rbvd, StateId};
+use sharp_space::{Cell, Heading, Point, Pose, Seed};
+
+use crate::leg::{Leg, LegId, allowed_states, endpoints};
+use crate::percept::Workspace;
+use crate::search::{Candidate, OptionGraph};
+use crate::sharp::{Monitor, Phase};
+
+/// The abstraction of one map for one robot: Φ, Ψ and O.
+#[derive(Clone, Debug)]
+pub struct Abstraction {
+    /// The region-based Voronoi diagram.
+    pub rbvd: Arc<Rbvd>,
+    /// The options synthesised from it.
+    pub options: Arc<OptionSet>,
+}
+
+/// What the search may assume and must respect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchSettings {
+    /// Speed that turns lengths into seconds before anything was measured, metres per second.
+    pub nominal_speed_mps: f64,
+    /// Seconds added to a leg without a policy: what training is worth; 0 is the paper's rule.
+    pub untrained_surcharge_s: f64,
+    /// Largest turn between two guides that a robot takes in its stride, radians.
+    pub smooth_turn_rad: f64,
+    /// How guides are planned.
+    pub guide: GuideSettings,
+}
+
+impl SearchSettings {
+    /// Settings for the robot of `workspace`.
+    #[must_use]
+    pub fn new(workspace: &Workspace) -> Self {
+        Self {
+            nominal_speed_mps: 0.5 * workspace.robot.max_speed_mps,
+            untrained_surcharge_s: 2.0,
+            // The footprint swings out in a turn: beyond 75 degrees it needs room or a smaller circle.
+            smooth_turn_rad: 75.0_f64.to_radians(),
+            guide: GuideSettings::default(),
+        }
+    }
+}
+
+/// Where a plan begins and ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Query {
+    /// The initial configuration x_i.
+    pub start: Pose,
+    /// The goal configuration x_g.
+    pub goal: Pose,
+}
+
+/// The guided legs of one problem and the searches among them.
+#[derive(Debug)]
+pub struct Planner<'a> {
+    workspace: &'a Workspace,
+    abstraction: &'a Abstraction,
+    settings: SearchSettings,
+    query: Query,
+    graph: OptionGraph,
+    guided: BTreeMap<LegId, Result<Arc<Leg>, NoGuide>>,
+    banned: BTreeSet<LegId>,
+    seed: Seed,
+}
+
+/// Why there is no planner for a query: no abstract state at one of its ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unplaced {
+    /// No state near the start.
+    Start,
+    /// No state near the goal.
+    Goal,
+}
+
+impl<'a> Planner<'a> {
+    /// A planner for `query`; `known` are guides from earlier problems.
+    ///
+    /// # Errors
+    /// Names the end of the query that lies in no abstract state (Algorithm 1, line 8).
+    pub fn new(
+        workspace: &'a Workspace,
+        abstraction: &'a Abstraction,
+        settings: SearchSettings,
+        query: Query,
+        known: impl IntoIterator<Item = (LegId, GuidePath)>,
+        seed: Seed,
+    ) -> Result<Self, Unplaced> {
+        let start = state_near(&abstraction.rbvd, query.start.position).ok_or(Unplaced::Start)?;
+        let goal = state_near(&abstraction.rbvd, query.goal.position).ok_or(Unplaced::Goal)?;
+        let graph = OptionGraph::new(&abstraction.rbvd, &abstraction.options, (query.start, start), (query.goal, goal));
+        let guided = BTreeMap::new();
+        let mut this =
+            Self { workspace, abstraction, settings, query, graph, guided, banned: BTreeSet::new(), seed };
+        for (id, guide) in known {
+            if let Some(candidate) = this.graph.candidate(id).cloned() {
+                this.guided.insert(id, Ok(Arc::new(this.leg(&candidate, guide))));
+            }
+        }
+        Ok(this)
+    }
+
+    /// Takes the leg called `id` out of all further searches.
+    pub fn ban(&mut self, id: LegId) {
+        self.banned.insert(id);
+    }
+
+    /// The cheapest plan of guided legs, or `None`. `measured` knows what learnt legs cost, seconds.
+    pub fn plan(
+        &mut self,
+        measured: &dyn Fn(LegId) -> Option<f64>,
+        monitor: &dyn Monitor,
+    ) -> Option<Vec<Arc<Leg>>> {
+        loop {
+            monitor.phase(Phase::Search);
+            let top_speed = self.workspace.robot.max_speed_mps;
+            let cost = |leg: &Candidate| self.cost(leg, measured(leg.id));
+            let (_, ids) = self.graph.search(top_speed, cost, |before, after| self.join(before, after))?;
+            let missing: Vec<LegId> = ids.iter().copied().filter(|id| !self.guided.contains_key(id)).collect();
+            if missing.is_empty() {
+                return ids.iter().map(|id| self.guided[id].clone().ok()).collect();
+            }
+            monitor.phase(Phase::Guide);
+            let guided: Vec<_> = missing.par_iter().map(|&id| (id, self.guide(id))).collect();
+            self.guided.extend(guided);
+        }
+    }
+
+    /// The legs that could not be guided, with the reason.
+    pub fn unguided(&self) -> impl Iterator<Item = (LegId, &NoGuide)> {
+        self.guided.iter().filter_map(|(&id, leg)| leg.as_ref().err().map(|reason| (id, reason)))
+    }
+
+    fn cost(&self, leg: &Candidate, measured: Option<f64>) -> f64 {
+        if self.banned.contains(&leg.id) {
+            return f64::INFINITY;
+        }
+        let straight_m = (leg.end - leg.start).norm();
+        let length_m = match self.guided.get(&leg.id) {
+            Some(Ok(guided)) => guided.guide.length_m().max(straight_m),
+            Some(Err(_)) => return f64::INFINITY,
+            None => straight_m,
+        };
+        let least_s = straight_m / self.workspace.robot.max_speed_mps;
+        let estimated = length_m / self.settings.nominal_speed_mps + self.settings.untrained_surcharge_s;
+        measured.map_or(estimated, |seconds| seconds.max(least_s))
+    }
+
+    /// Seconds lost where one guide ends and the next begins; infinite where the robot cannot turn so.
+    fn join(&self, before: &Candidate, after: &Candidate) -> f64 {
+        let (Some(Ok(first)), Some(Ok(second))) = (self.guided.get(&before.id), self.guided.get(&after.id)) else {
+            return 0.0;
+        };
+        let turn = first.guide.end().heading.turn_to(second.guide.start().heading).abs();
+        let robot = &self.workspace.robot;
+        let turn_s = turn / (robot.max_yaw_rate_radps * robot.yaw_gain());
+        if turn <= self.settings.smooth_turn_rad {
+            return turn_s;
+        }
+        // Room for the whole circle and for arriving off the centre.
+        let room_m = self.workspace.checker.field().sample(after.start);
+        let spins = robot.can_turn_in_place() && room_m > robot.footprint.circumscribed_radius_m() + 0.3;
+        if spins { turn_s + 2.0 } else { f64::INFINITY }
+    }
+
+    fn guide(&self, id: LegId) -> Result<Arc<Leg>, NoGuide> {
+        let candidate = self.graph.candidate(id).expect("the search returns its own legs");
+        let frame = self.abstraction.rbvd.frame();
+        let options = &self.abstraction.options;
+        let (source, target) = endpoints(options, id);
+        let (source, target) = (source.map(|id| options.endpoint(id)), target.map(|id| options.endpoint(id)));
+        let states = allowed_states(id, candidate.from, candidate.to);
+        let near = |endpoint: Option<&Endpoint>, cell: Cell| {
+            endpoint.is_some_and(|endpoint| endpoint.contains(frame.center(cell), &self.abstraction.rbvd))
+        };
+        let allowed = |cell: Cell| {
+            self.abstraction.rbvd.state_of(cell).is_some_and(|state| states.contains(&state))
+                || near(source, cell)
+                || near(target, cell)
+        };
+        let start_heading = match id {
+            LegId::First(_) | LegId::Direct => Some(self.query.start.heading),
+            LegId::Option(_) | LegId::Last(..) => None,
+        };
+        let request = GuideRequest {
+            start: GuideEnd { position: candidate.start, heading: start_heading },
+            goal: GuideEnd { position: candidate.end, heading: target.and_then(|end| approach(end, candidate.to)) },
+            allowed: &allowed,
+        };
+        let mut rng = self.seed.stream(&format!("guide {id}"), 0);
+        let radius_m = self.workspace.robot.min_turning_radius_m();
+        let steering = if radius_m > 0.0 { Steering::Dubins { radius_m } } else { Steering::RotateTranslate };
+        let guide = plan_guide(&request, &self.workspace.checker, &steering, &self.settings.guide, &mut rng)?;
+        Ok(Arc::new(self.leg(candidate, guide)))
+    }
+
+    fn leg(&self, candidate: &Candidate, guide: GuidePath) -> Leg {
+        let Abstraction { rbvd, options } = self.abstraction;
+        let goal = (self.query.goal.position, self.workspace.robot.goal_tolerance_m);
+        Leg::new((rbvd, options), candidate.id, (candidate.from, candidate.to), guide, goal)
+    }
+}
+
+/// The direction in which an interface is crossed towards `to`.
+fn approach(endpoint: &Endpoint, to: StateId) -> Option<Heading> {
+    let normal = endpoint.normal?;
+    let forward = endpoint.states.last() == Some(&to);
+    Some(if forward { normal } else { Heading::new(normal.radians() + std::f64::consts::PI) })
+}
+
+/// α(x), or the state of the nearest cell that has one within half a metre: a robot may stand where
+/// the diagram's margin has no state.
+fn state_near(rbvd: &Rbvd, point: Point) -> Option<StateId> {
+    if let Some(state) = rbvd.state_at(point) {
+        return Some(state);
+    }
+    let frame = rbvd.frame();
+    let center = frame.cell_at(point)?;
+    let reach = (0.5 / frame.resolution_m).ceil() as usize;
+    let rows = center.row.saturating_sub(reach)..=(center.row + reach).min(frame.height - 1);
+    rows.flat_map(|row| {
+        let cols = center.col.saturating_sub(reach)..=(center.col + reach).min(frame.width - 1);
+        cols.map(move |col| Cell::new(col, row))
+    })
+    .filter_map(|cell| rbvd.state_of(cell).map(|state| ((frame.center(cell) - point).norm(), cell, state)))
+    .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+    .map(|(_, _, state)| state)
+}

@@ -1,0 +1,233 @@
+//! A* over options (Algorithm 1, line 9).
+//!
+//! The nodes are legs, so that the join of two legs can carry a cost: a guide that ends facing east
+//! cannot always be followed by one that begins to the south. Costs are seconds throughout. A leg
+//! costs its measured time where it was learnt, its guide's length at nominal speed where it was
+//! guided, and the straight distance at nominal speed before that; the heuristic is the straight
+//! distance at top speed, which never overestimates.
+
+use std::collections::BTreeMap;
+
+use petgraph::algo::astar;
+use petgraph::graph::{DiGraph, NodeIndex};
+use serde::{Deserialize, Serialize};
+use sharp_options::{Endpoint, EndpointId, EndpointSite, OptionKind, OptionSet, OptionSpec};
+use sharp_rbvd::{Rbvd, StateId};
+use sharp_space::{Point, Pose};
+
+use crate::leg::LegId;
+
+/// The cost of a leg, seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum OptionCost {
+    /// Computed from a length; before anything was learnt.
+    Estimated(f64),
+    /// Mean simulated time of the learnt policy, weighed with its success.
+    Measured(f64),
+}
+
+impl OptionCost {
+    /// The cost, seconds.
+    #[must_use]
+    pub const fn seconds(&self) -> f64 {
+        match self {
+            Self::Estimated(seconds) | Self::Measured(seconds) => *seconds,
+        }
+    }
+}
+
+/// A leg that the search may choose, before it has a guide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Its name.
+    pub id: LegId,
+    /// The state it leaves.
+    pub from: StateId,
+    /// The state it ends in.
+    pub to: StateId,
+    /// Centre of the initiation set.
+    pub start: Point,
+    /// Centre of the termination set.
+    pub end: Point,
+    /// The endpoint it ends at; `None` at the goal configuration.
+    pub endpoint: Option<EndpointId>,
+}
+
+/// All legs of one problem and which may follow which.
+#[derive(Clone, Debug)]
+pub struct OptionGraph {
+    graph: DiGraph<Option<Candidate>, ()>,
+    nodes: BTreeMap<LegId, NodeIndex>,
+    root: NodeIndex,
+    goal: Point,
+}
+
+impl OptionGraph {
+    /// The graph for a problem from `start` to `goal`, whose states are `s_i` and `s_g`.
+    #[must_use]
+    pub fn new(rbvd: &Rbvd, options: &OptionSet, start: (Pose, StateId), goal: (Pose, StateId)) -> Self {
+        let mut graph = DiGraph::new();
+        let root = graph.add_node(None);
+        let mut this = Self { graph, nodes: BTreeMap::new(), root, goal: goal.0.position };
+        let mut entering: BTreeMap<(EndpointId, StateId), Vec<NodeIndex>> = BTreeMap::new();
+        for candidate in first_legs(rbvd, options, start, goal) {
+            let (endpoint, to) = (candidate.endpoint, candidate.to);
+            let node = this.add(candidate);
+            this.graph.add_edge(root, node, ());
+            if let Some(endpoint) = endpoint {
+                entering.entry((endpoint, to)).or_default().push(node);
+            }
+        }
+        for spec in options.options() {
+            let node = this.add(option_candidate(options, spec));
+            entering.entry((spec.termination, entered(spec))).or_default().push(node);
+        }
+        for candidate in last_legs(rbvd, options, goal) {
+            let (endpoint, from) = (candidate.endpoint, candidate.from);
+            let node = this.add(Candidate { endpoint: None, ..candidate });
+            for &before in endpoint.iter().flat_map(|&e| entering.get(&(e, from)).into_iter().flatten()) {
+                this.graph.add_edge(before, node, ());
+            }
+        }
+        for spec in options.options() {
+            let node = this.nodes[&LegId::Option(spec.id)];
+            for &before in entering.get(&(spec.initiation, left(spec))).into_iter().flatten() {
+                if !goes_back(this.graph[before].as_ref(), spec) {
+                    this.graph.add_edge(before, node, ());
+                }
+            }
+        }
+        this
+    }
+
+    fn add(&mut self, candidate: Candidate) -> NodeIndex {
+        let id = candidate.id;
+        let node = self.graph.add_node(Some(candidate));
+        self.nodes.insert(id, node);
+        node
+    }
+
+    /// The leg called `id`.
+    #[must_use]
+    pub fn candidate(&self, id: LegId) -> Option<&Candidate> {
+        self.nodes.get(&id).and_then(|&node| self.graph[node].as_ref())
+    }
+
+    /// The cheapest sequence of legs from start to goal, or `None` if every one has an infinite cost.
+    ///
+    /// `cost(leg)` and `join(before, after)` are seconds, not negative, infinite where impossible;
+    /// `cost` may not fall below the straight distance divided by `speed_max_mps`.
+    pub fn search(
+        &self,
+        speed_max_mps: f64,
+        cost: impl Fn(&Candidate) -> f64,
+        join: impl Fn(&Candidate, &Candidate) -> f64,
+    ) -> Option<(f64, Vec<LegId>)> {
+        let is_goal = |node: NodeIndex| self.graph[node].as_ref().is_some_and(|leg| leg.endpoint.is_none());
+        let edge_cost = |before: NodeIndex, after: NodeIndex| {
+            let after = self.graph[after].as_ref().map_or(0.0, |leg| {
+                cost(leg) + self.graph[before].as_ref().map_or(0.0, |before| join(before, leg))
+            });
+            debug_assert!(after >= 0.0, "costs are not negative");
+            after
+        };
+        let heuristic = |node: NodeIndex| {
+            self.graph[node].as_ref().map_or(0.0, |leg| (leg.end - self.goal).norm() / speed_max_mps)
+        };
+        use petgraph::visit::EdgeRef;
+        let found = astar(&self.graph, self.root, is_goal, |e| edge_cost(e.source(), e.target()), heuristic);
+        let (seconds, nodes) = found.filter(|(seconds, _)| seconds.is_finite())?;
+        Some((seconds, nodes.iter().filter_map(|&node| self.graph[node].as_ref().map(|leg| leg.id)).collect()))
+    }
+}
+
+/// The state that a robot is about to enter at the end of `spec`.
+fn entered(spec: &OptionSpec) -> StateId {
+    spec.id.to()
+}
+
+/// The state in which a robot that may begin `spec` is about to be.
+fn left(spec: &OptionSpec) -> StateId {
+    spec.id.through().unwrap_or(spec.id.from())
+}
+
+/// A centroid option back to where the one before came from never helps.
+fn goes_back(before: Option<&Candidate>, spec: &OptionSpec) -> bool {
+    let came_from = before.filter(|before| matches!(before.id, LegId::Option(_))).map(|before| before.from);
+    spec.id.kind() == OptionKind::Centroid && came_from == Some(spec.id.to())
+}
+
+fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
+    Candidate {
+        id: LegId::Option(spec.id),
+        from: spec.id.from(),
+        to: spec.id.to(),
+        start: options.endpoint(spec.initiation).center,
+        end: options.endpoint(spec.termination).center,
+        endpoint: Some(spec.termination),
+    }
+}
+
+/// π_0: from the start to each endpoint of its own state, and to the centroids next door, so that
+/// nobody has to drive back to a centroid first; straight to the goal if it lies in the same state.
+fn first_legs(rbvd: &Rbvd, options: &OptionSet, start: (Pose, StateId), goal: (Pose, StateId)) -> Vec<Candidate> {
+    let mut legs = Vec::new();
+    if start.1 == goal.1 {
+        legs.push(Candidate {
+            id: LegId::Direct,
+            from: start.1,
+            to: goal.1,
+            start: start.0.position,
+            end: goal.0.position,
+            endpoint: None,
+        });
+    }
+    for endpoint_id in endpoints_near(rbvd, options, start.1) {
+        let endpoint = options.endpoint(endpoint_id);
+        let to = other_state(&endpoint.states, start.1);
+        legs.push(Candidate {
+            id: LegId::First(endpoint_id.0),
+            from: start.1,
+            to,
+            start: start.0.position,
+            end: endpoint.center,
+            endpoint: Some(endpoint_id),
+        });
+    }
+    legs
+}
+
+/// π_{n+1}: from each endpoint of the goal's state, and from the centroids next door, to the goal.
+fn last_legs(rbvd: &Rbvd, options: &OptionSet, goal: (Pose, StateId)) -> Vec<Candidate> {
+    endpoints_near(rbvd, options, goal.1)
+        .into_iter()
+        .map(|endpoint_id| {
+            let endpoint = options.endpoint(endpoint_id);
+            // Entered from the other side of an interface, the robot is about to be in the goal's state.
+            let from = if endpoint.states.len() > 1 { goal.1 } else { endpoint.states[0] };
+            Candidate {
+                id: LegId::Last(endpoint_id.0, from),
+                from,
+                to: goal.1,
+                start: endpoint.center,
+                end: goal.0.position,
+                endpoint: Some(endpoint_id),
+            }
+        })
+        .collect()
+}
+
+/// The endpoints of `state` itself, and the centroids of its neighbours.
+fn endpoints_near(rbvd: &Rbvd, options: &OptionSet, state: StateId) -> Vec<EndpointId> {
+    let is_near = |endpoint: &Endpoint| match endpoint.site {
+        EndpointSite::Centroid(other) => other == state || rbvd.neighbors(state).contains(&other),
+        EndpointSite::Interface(_) => endpoint.states.contains(&state),
+    };
+    let numbered = options.endpoints().iter().zip(0..);
+    numbered.filter(|(endpoint, _)| is_near(endpoint)).map(|(_, index)| EndpointId(index)).collect()
+}
+
+/// The state on the far side of an interface, or the centroid's own.
+fn other_state(states: &[StateId], near: StateId) -> StateId {
+    states.iter().copied().find(|&state| state != near).unwrap_or(near)
+}

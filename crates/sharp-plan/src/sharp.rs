@@ -1,0 +1,393 @@
+//! Algorithm 1: from an abstraction and a problem to a policy composed of options.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use sharp_options::OptionKind;
+use sharp_sim::{NoiseModel, RobotState};
+use sharp_space::Seed;
+
+use crate::certify::Trial;
+use crate::files::FileError;
+use crate::learn::{LearnFailure, LearnSettings, Learnt, LearningMode, Lesson};
+use crate::leg::{Leg, LegId, Role};
+use crate::library::{OptionLibrary, StoredOption};
+use crate::percept::Workspace;
+use crate::planner::{Abstraction, Planner, Query, SearchSettings, Unplaced};
+use crate::rollout::{ChainRun, Driver, LegOutcome};
+use crate::starts::{StartSpread, Starts};
+use crate::stats::Tally;
+
+/// Start states kept of each leg.
+const START_POOL: usize = 256;
+/// Plans tried before the problem counts as unsolvable.
+const ATTEMPTS_MAX: usize = 24;
+
+/// All settings of [`solve`].
+#[derive(Clone, Debug)]
+pub struct SolveSettings {
+    /// How policies are learnt.
+    pub learn: LearnSettings,
+    /// How plans are searched.
+    pub search: SearchSettings,
+    /// The noise that policies are learnt and verified under.
+    pub noise: NoiseModel,
+    /// Runs through the whole plan that look for weak legs, each round.
+    pub repair_episodes: u32,
+    /// Rounds of repair; 0 is the paper's rule.
+    pub repair_rounds: u32,
+    /// Fresh runs through the whole plan that its predicted success is counted on.
+    pub verify_episodes: u32,
+    /// A leg that holds less often than this in the plan loses its edge.
+    pub usable_success: f64,
+    /// The root of all randomness.
+    pub seed: Seed,
+}
+
+impl SolveSettings {
+    /// The settings of `mode` for the robot of `workspace`.
+    #[must_use]
+    pub fn new(workspace: &Workspace, mode: LearningMode, noise: NoiseModel, seed: Seed) -> Self {
+        let mut search = SearchSettings::new(workspace);
+        if mode == LearningMode::Paper {
+            search.untrained_surcharge_s = 0.0;
+        }
+        Self {
+            learn: LearnSettings::new(mode),
+            search,
+            noise,
+            repair_episodes: 400,
+            repair_rounds: if mode == LearningMode::Paper { 0 } else { 3 },
+            verify_episodes: 1000,
+            // The paper keeps whatever was learnt.
+            usable_success: if mode == LearningMode::Paper { 0.0 } else { 0.9 },
+            seed,
+        }
+    }
+}
+
+/// What [`solve`] is busy with; a new phase ends the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// A* over options.
+    Search,
+    /// The guides that the search asked for.
+    Guide,
+    /// Learning the policies of this many legs.
+    Learn(usize),
+    /// Running the whole plan, and repairing weak legs.
+    Verify,
+    /// Nothing any more.
+    Done,
+}
+
+/// Watches [`solve`] and may stop it. `()` watches nothing.
+pub trait Monitor: Sync {
+    /// A phase begins.
+    fn phase(&self, _phase: Phase) {}
+    /// A leg was learnt.
+    fn learnt(&self, _leg: &Leg, _learnt: &Learnt) {}
+    /// Asked often; true ends the search as soon as possible. What was learnt is kept.
+    fn should_stop(&self) -> bool {
+        false
+    }
+}
+
+impl Monitor for () {}
+
+/// A leg of a solution.
+#[derive(Clone, Debug)]
+pub struct PlannedLeg {
+    /// The leg and its guide.
+    pub leg: Arc<Leg>,
+    /// Its policy.
+    pub learnt: Learnt,
+    /// True for an option whose policy existed before this problem.
+    pub reused: bool,
+    /// How often it held when entered the way the leg before it arrives.
+    pub on_arrival: Tally,
+}
+
+/// A policy composed of options with its measured odds.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The problem.
+    pub query: Query,
+    /// π_0, the options, π_{n+1}.
+    pub legs: Vec<PlannedLeg>,
+    /// Fresh runs through the whole plan, without recovery and without contact.
+    pub predicted: Tally,
+    /// Mean simulated time of the successful ones, seconds.
+    pub predicted_time_s: f64,
+}
+
+impl Solution {
+    /// Option uses and how many of them found their policy in the library.
+    #[must_use]
+    pub fn reuse(&self) -> (usize, usize) {
+        let options = self.legs.iter().filter(|planned| planned.leg.id.role() == Role::Option);
+        options.fold((0, 0), |(uses, reused), planned| (uses + 1, reused + usize::from(planned.reused)))
+    }
+}
+
+/// How [`solve`] ended.
+#[derive(Debug)]
+pub enum Outcome {
+    /// With a policy.
+    Solved(Box<Solution>),
+    /// There is no plan; says why.
+    NoPlan(String),
+    /// The monitor stopped it; what was learnt is in the library.
+    Stopped,
+}
+
+/// Algorithm 1 from line 8 on: `abstraction` is what lines 4 to 7 built.
+///
+/// # Errors
+/// Returns an error if the library cannot be written.
+pub fn solve(
+    workspace: &Workspace,
+    abstraction: &Abstraction,
+    query: Query,
+    settings: &SolveSettings,
+    library: &mut OptionLibrary,
+    monitor: &dyn Monitor,
+) -> Result<Outcome, FileError> {
+    monitor.phase(Phase::Search);
+    let known: Vec<_> = library.iter().map(|(id, stored)| (LegId::Option(id), stored.guide.clone())).collect();
+    let planner = match Planner::new(workspace, abstraction, settings.search, query, known, settings.seed) {
+        Ok(planner) => planner,
+        Err(unplaced) => return Ok(Outcome::NoPlan(describe_unplaced(unplaced).to_owned())),
+    };
+    let before = library.iter().map(|(id, _)| LegId::Option(id)).collect();
+    let mut run = Run { workspace, query, settings, library, monitor, planner, before, learnt: BTreeMap::new() };
+    let outcome = run.solve();
+    monitor.phase(Phase::Done);
+    outcome
+}
+
+fn describe_unplaced(unplaced: Unplaced) -> &'static str {
+    match unplaced {
+        Unplaced::Start => "the start lies in no abstract state: the robot cannot leave it",
+        Unplaced::Goal => "the goal lies in no abstract state: the robot cannot reach it",
+    }
+}
+
+/// One call of [`solve`].
+struct Run<'a> {
+    workspace: &'a Workspace,
+    query: Query,
+    settings: &'a SolveSettings,
+    library: &'a mut OptionLibrary,
+    monitor: &'a dyn Monitor,
+    planner: Planner<'a>,
+    before: Vec<LegId>,
+    /// Everything with a policy in this problem: from the library, or learnt now.
+    learnt: BTreeMap<LegId, Learnt>,
+}
+
+impl Run<'_> {
+    fn solve(&mut self) -> Result<Outcome, FileError> {
+        self.learnt.extend(self.library.iter().map(|(id, stored)| (LegId::Option(id), stored.learnt.clone())));
+        for _ in 0..ATTEMPTS_MAX {
+            let learnt = &self.learnt;
+            let Some(legs) = self.planner.plan(&|id| learnt.get(&id).map(Learnt::cost_s), self.monitor) else {
+                return Ok(Outcome::NoPlan(self.describe_no_plan()));
+            };
+            if self.monitor.should_stop() || !self.learn_missing(&legs)? {
+                return Ok(Outcome::Stopped);
+            }
+            if self.ban_useless(&legs, |run, leg| run.learnt[&leg.id].verified) {
+                continue;
+            }
+            self.monitor.phase(Phase::Verify);
+            for round in 0..self.settings.repair_rounds {
+                if self.monitor.should_stop() {
+                    return Ok(Outcome::Stopped);
+                }
+                if !self.repair(&legs, u64::from(round))? {
+                    break;
+                }
+            }
+            let runs = self.run_chain(&legs, self.settings.verify_episodes, "verify", 0);
+            let on_arrival = tallies(&runs, legs.len());
+            let weak = |_: &Self, leg: &Leg| {
+                let index = legs.iter().position(|other| other.id == leg.id).expect("a leg of this plan");
+                on_arrival[index]
+            };
+            if self.ban_useless(&legs, weak) {
+                continue;
+            }
+            return Ok(Outcome::Solved(Box::new(self.solution(&legs, &runs, &on_arrival))));
+        }
+        Ok(Outcome::NoPlan(format!("{ATTEMPTS_MAX} plans were tried and none held")))
+    }
+
+    /// Lines 11 to 19: learns what neither the library nor an earlier attempt has. Returns false if stopped.
+    fn learn_missing(&mut self, legs: &[Arc<Leg>]) -> Result<bool, FileError> {
+        let missing: Vec<&Arc<Leg>> = legs.iter().filter(|leg| !self.learnt.contains_key(&leg.id)).collect();
+        self.monitor.phase(Phase::Learn(missing.len()));
+        let results: Vec<_> = missing
+            .par_iter()
+            .map(|&leg| {
+                let seed = self.settings.seed.child(&format!("leg {}", leg.id), 0);
+                let result = self.lesson(leg, self.starts(leg, seed), seed).learn(&|| self.monitor.should_stop());
+                if let Ok(learnt) = &result {
+                    self.monitor.learnt(leg, learnt);
+                }
+                (Arc::clone(leg), result)
+            })
+            .collect();
+        let mut finished = true;
+        for (leg, result) in results {
+            match result {
+                Ok(learnt) => self.keep(&leg, learnt)?,
+                Err(LearnFailure::Stopped) => finished = false,
+                // A broken task cannot be learnt: its edge goes, the search goes on.
+                Err(LearnFailure::Broken(_)) => self.keep(&leg, useless())?,
+            }
+        }
+        Ok(finished)
+    }
+
+    fn lesson<'b>(&'b self, leg: &'b Arc<Leg>, starts: Starts, seed: Seed) -> Lesson<'b> {
+        let (workspace, noise, settings) = (self.workspace, &self.settings.noise, &self.settings.learn);
+        Lesson { workspace, leg, starts: Arc::new(starts), noise, settings, seed }
+    }
+
+    fn starts(&self, leg: &Leg, seed: Seed) -> Starts {
+        match leg.id {
+            LegId::First(_) | LegId::Direct => Starts::exactly(RobotState::at_rest(self.query.start)),
+            LegId::Option(_) | LegId::Last(..) => {
+                Starts::spread(self.workspace, leg, &StartSpread::default(), START_POOL, seed)
+            }
+        }
+    }
+
+    fn keep(&mut self, leg: &Leg, learnt: Learnt) -> Result<(), FileError> {
+        if let (LegId::Option(id), true) = (leg.id, learnt.verified.successes > 0) {
+            self.library.insert(id, StoredOption { guide: leg.guide.clone(), learnt: learnt.clone() })?;
+        }
+        self.learnt.insert(leg.id, learnt);
+        Ok(())
+    }
+
+    /// Takes the legs that hold too rarely out of the search. Returns true if there was one.
+    fn ban_useless(&mut self, legs: &[Arc<Leg>], tally: impl Fn(&Self, &Leg) -> Tally) -> bool {
+        let is_useless = |leg: &&Arc<Leg>| {
+            let tally = tally(self, leg);
+            tally.episodes > 0 && tally.rate() < self.settings.usable_success
+        };
+        let useless: Vec<LegId> = legs.iter().filter(is_useless).map(|leg| leg.id).collect();
+        for &id in &useless {
+            self.planner.ban(id);
+        }
+        !useless.is_empty()
+    }
+
+    fn drivers<'b>(&'b self, legs: &'b [Arc<Leg>]) -> Vec<Driver<'b>> {
+        let next = |index: usize| legs.get(index + 1).map(|leg| &leg.guide);
+        let driver = |(index, leg): (usize, &'b Arc<Leg>)| Driver {
+            leg,
+            policy: &self.learnt[&leg.id].policy,
+            next: next(index),
+        };
+        legs.iter().enumerate().map(driver).collect()
+    }
+
+    fn run_chain(&self, legs: &[Arc<Leg>], episodes: u32, purpose: &str, index: u64) -> Vec<ChainRun> {
+        let seed = self.settings.seed.child(purpose, index);
+        let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes, seed };
+        trial.of_chain(&self.drivers(legs), RobotState::at_rest(self.query.start))
+    }
+
+    /// Runs the plan and trains the weak legs on the states in which they were really entered.
+    /// Returns false if no leg was weak or none became better.
+    fn repair(&mut self, legs: &[Arc<Leg>], round: u64) -> Result<bool, FileError> {
+        let runs = self.run_chain(legs, self.settings.repair_episodes, "repair", round);
+        let on_arrival = tallies(&runs, legs.len());
+        let is_weak = |tally: &Tally| tally.episodes >= 50 && tally.rate() < self.settings.learn.wanted_success;
+        let weak: Vec<usize> = (0..legs.len()).filter(|&index| is_weak(&on_arrival[index])).collect();
+        let results: Vec<_> = weak.par_iter().map(|&index| self.relearn(&legs[index], index, &runs, round)).collect();
+        let mut better = false;
+        for (index, learnt) in weak.into_iter().zip(results) {
+            if let Some(learnt) = learnt {
+                better = true;
+                self.monitor.learnt(&legs[index], &learnt);
+                self.keep(&legs[index], learnt)?;
+            }
+        }
+        Ok(better)
+    }
+
+    /// A policy for `leg` that holds more often than its present one on what `runs` arrived with.
+    fn relearn(&self, leg: &Arc<Leg>, index: usize, runs: &[ChainRun], round: u64) -> Option<Learnt> {
+        let arrivals: Vec<RobotState> = runs.iter().filter_map(|run| run.entries.get(index).copied()).collect();
+        let seed = self.settings.seed.child(&format!("repair {}", leg.id), round);
+        let starts = self.starts(leg, seed).with_arrivals(arrivals);
+        let lesson = self.lesson(leg, starts, seed);
+        let old = &self.learnt[&leg.id];
+        let episodes = self.settings.learn.certify_episodes;
+        let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes, seed };
+        let present = trial.of_leg(leg, &old.policy, &lesson.starts).tally;
+        let mut new = lesson.learn(&|| self.monitor.should_stop()).ok()?;
+        new.env_steps += old.env_steps;
+        new.gradient_steps += old.gradient_steps;
+        (new.verified.successes > present.successes).then_some(new)
+    }
+
+    fn solution(&self, legs: &[Arc<Leg>], runs: &[ChainRun], on_arrival: &[Tally]) -> Solution {
+        let planned = |(leg, &on_arrival): (&Arc<Leg>, &Tally)| PlannedLeg {
+            leg: Arc::clone(leg),
+            learnt: self.learnt[&leg.id].clone(),
+            reused: self.before.contains(&leg.id),
+            on_arrival,
+        };
+        let succeeded: Vec<f64> = runs
+            .iter()
+            .filter(|run| run.outcome == LegOutcome::Done)
+            .map(|run| run.times_s.iter().sum())
+            .collect();
+        Solution {
+            query: self.query,
+            legs: legs.iter().zip(on_arrival).map(planned).collect(),
+            predicted: Tally::count(runs.iter().map(|run| run.outcome == LegOutcome::Done)),
+            predicted_time_s: succeeded.iter().sum::<f64>() / succeeded.len().max(1) as f64,
+        }
+    }
+
+    fn describe_no_plan(&self) -> String {
+        let unguided = self.planner.unguided().count();
+        let first = self.planner.unguided().next();
+        match first {
+            Some((id, reason)) => format!(
+                "no sequence of options leads from the start to the goal; {unguided} legs have no guide, among them {id}: {reason}"
+            ),
+            None => "no sequence of options leads from the start to the goal".to_owned(),
+        }
+    }
+}
+
+/// Stands for a policy that never succeeds.
+fn useless() -> Learnt {
+    let follower = crate::policy::Follower { look_ahead_m: 0.5, reach_m: 0.2 };
+    let verified = Tally { episodes: 1, successes: 0 };
+    let policy = crate::policy::OptionPolicy::Follower(follower);
+    Learnt { policy, verified, mean_time_s: f64::INFINITY, env_steps: 0, gradient_steps: 0 }
+}
+
+/// For each leg: how often it was entered, and how often it then held.
+fn tallies(runs: &[ChainRun], legs: usize) -> Vec<Tally> {
+    let entered = |index: usize| runs.iter().filter(move |run| run.entries.len() > index);
+    (0..legs).map(|index| Tally::count(entered(index).map(|run| run.passed(index)))).collect()
+}
+
+/// The letter that names a kind of option in files and flags.
+#[must_use]
+pub const fn kind_name(kind: OptionKind) -> &'static str {
+    match kind {
+        OptionKind::Centroid => "centroid",
+        OptionKind::Interface => "interface",
+    }
+}

@@ -1,0 +1,98 @@
+//! The learning task of an option: where simulator, guide and reinforcement learning meet.
+
+use std::sync::Arc;
+
+use rand::RngExt;
+use sharp_rl::{Environment, EnvironmentSpec, Step};
+use sharp_sim::{KinematicSim, NoiseModel, Vehicle};
+use sharp_space::{Seed, Stream};
+
+use crate::leg::Leg;
+use crate::learn::RewardMode;
+use crate::percept::{Percept, Tracker, Workspace};
+use crate::policy::{Form, GuideView};
+use crate::starts::Starts;
+
+/// A leg as a Markov decision process for [`sharp_rl`].
+#[derive(Clone, Debug)]
+pub struct LegTask {
+    workspace: Workspace,
+    leg: Arc<Leg>,
+    form: Form,
+    reward: RewardMode,
+    starts: Arc<Starts>,
+    vehicle: Vehicle<KinematicSim>,
+    seed: Seed,
+    percept: Option<Percept>,
+    tracker: Tracker,
+    actions: u32,
+}
+
+impl LegTask {
+    /// The task of `leg` under `noise`; episodes draw their noise from `seed`.
+    #[must_use]
+    pub fn new(
+        workspace: &Workspace,
+        leg: Arc<Leg>,
+        form: Form,
+        reward: RewardMode,
+        starts: Arc<Starts>,
+        (noise, seed): (&NoiseModel, Seed),
+    ) -> Self {
+        let vehicle = crate::learn::kinematic_vehicle(workspace, noise, reward.contact_ends());
+        Self {
+            workspace: workspace.clone(),
+            leg,
+            form,
+            reward,
+            starts,
+            vehicle,
+            seed,
+            percept: None,
+            tracker: Tracker::default(),
+            actions: 0,
+        }
+    }
+
+    fn observe(&self, percept: &Percept, observation: &mut [f32]) {
+        let view = GuideView { guide: &self.leg.guide, next: None };
+        self.form.observe(&self.workspace, percept, &self.tracker, &view, observation);
+    }
+}
+
+impl Environment for LegTask {
+    fn spec(&self) -> EnvironmentSpec {
+        EnvironmentSpec { observation_len: self.form.observation_len(), action_len: 2 }
+    }
+
+    fn reset(&mut self, rng: &mut Stream, observation: &mut [f32]) {
+        let state = self.starts.draw(rng);
+        // The caller's stream numbers the episode, so that a clone does not repeat its original.
+        self.vehicle.reset(state, self.seed, rng.random());
+        let percept = Percept::first(state);
+        self.tracker = Tracker::start(&self.leg.guide, &state.pose);
+        self.actions = 0;
+        self.observe(&percept, observation);
+        self.percept = Some(percept);
+    }
+
+    fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
+        let percept = self.percept.expect("reset comes before step");
+        let pose = percept.state.pose;
+        let view = GuideView { guide: &self.leg.guide, next: None };
+        let command = self.form.waypoint(&self.workspace.robot, &pose, self.tracker.arc_m, &view, action);
+        let report = self.vehicle.act(command.to_world(&pose));
+        let percept = percept.next(command, report.after);
+        let before = self.tracker;
+        self.tracker.update(&self.leg.guide, &percept.state.pose);
+        self.actions += 1;
+
+        let success = !(report.contact && self.reward.contact_ends()) && self.leg.is_done(&percept.state.pose);
+        let reward = self.reward.of(&self.leg, &percept.state.pose, (&before, &self.tracker), report.contact, success);
+        self.observe(&percept, observation);
+        self.percept = Some(percept);
+        let terminated = success || (report.contact && self.reward.contact_ends());
+        let horizon = self.leg.horizon_actions(crate::SLOWEST_REACH_M);
+        Step { reward: reward as f32, terminated, truncated: !terminated && self.actions >= horizon, success }
+    }
+}
