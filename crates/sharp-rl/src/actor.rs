@@ -133,7 +133,7 @@ pub struct ActorError {
 }
 
 impl Actor {
-    /// A fresh actor with ReLU layers of the widths `hidden`.
+    /// A fresh actor with `ReLU` layers of the widths `hidden`.
     ///
     /// # Panics
     /// If a width is zero.
@@ -150,7 +150,7 @@ impl Actor {
     pub fn from_parts(network: Mlp, normaliser: Normaliser) -> Result<Self, ActorError> {
         let sizes = network.sizes();
         let outputs = sizes[sizes.len() - 1];
-        if sizes[0] != normaliser.mean.len() || outputs % 2 != 0 {
+        if sizes[0] != normaliser.mean.len() || !outputs.is_multiple_of(2) {
             return Err(ActorError { sizes: sizes.to_vec(), normaliser_len: normaliser.mean.len() });
         }
         Ok(Self { network, normaliser })

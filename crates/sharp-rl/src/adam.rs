@@ -13,7 +13,7 @@ pub struct Adam {
 
 const BETA_1: f32 = 0.9;
 const BETA_2: f32 = 0.999;
-/// PyTorch's value; burn's own default is 1e-5.
+/// `PyTorch`'s value; burn's own default is 1e-5.
 const EPSILON: f32 = 1e-8;
 
 impl Adam {

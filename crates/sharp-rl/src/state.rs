@@ -38,7 +38,8 @@ pub struct TrainState {
     pub(crate) batch_rng: Stream,
     /// Draws evaluation episodes.
     pub(crate) evaluation_rng: Stream,
-    pub(crate) next_evaluation: u64,
+    /// Environment steps at the last evaluation; 0 before the first.
+    pub(crate) evaluated_at: u64,
 }
 
 /// Networks worth keeping.
@@ -90,7 +91,7 @@ impl TrainState {
             batch_rng: fork(),
             evaluation_rng: fork(),
             lanes: (0..lanes).map(|_| lane(fork())).collect(),
-            next_evaluation: 0,
+            evaluated_at: 0,
         }
     }
 
@@ -162,7 +163,7 @@ struct TrainHeader {
     env_steps: u64,
     updates: u64,
     episodes: u64,
-    next_evaluation: u64,
+    evaluated_at: u64,
     buffer_capacity: usize,
     buffer_len: usize,
     buffer_next: usize,
@@ -225,7 +226,7 @@ impl TrainState {
             env_steps: self.env_steps,
             updates: self.updates,
             episodes: self.episodes,
-            next_evaluation: self.next_evaluation,
+            evaluated_at: self.evaluated_at,
             buffer_capacity: self.buffer.capacity,
             buffer_len: self.buffer.len(),
             buffer_next: self.buffer.next,
@@ -265,7 +266,7 @@ impl TrainState {
             action_rng,
             batch_rng,
             evaluation_rng,
-            next_evaluation: header.next_evaluation,
+            evaluated_at: header.evaluated_at,
         })
     }
 }

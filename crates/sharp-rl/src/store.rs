@@ -1,7 +1,7 @@
 //! Networks as safetensors bytes: weights as tensors, everything else as one JSON header.
 //!
 //! The header lies in the metadata under `sharp-rl`; a single key, because the format's metadata
-//! is an unordered map and equal contents are to give equal bytes. Weights carry PyTorch's names
+//! is an unordered map and equal contents are to give equal bytes. Weights carry `PyTorch`'s names
 //! and layout (`actor.0.weight`, outputs x inputs). Loading trusts nothing: version, kind, shapes
 //! and finiteness are checked.
 

@@ -96,11 +96,11 @@ impl Environment for PointMass {
 
     fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
         let before = self.distance();
-        for axis in 0..2 {
+        let (place, velocity) = self.state.split_at_mut(2);
+        for ((place, velocity), push) in place.iter_mut().zip(velocity).zip(action) {
             let noise: f32 = self.rng.sample(StandardNormal);
-            let velocity = 0.9 * self.state[2 + axis] + Self::DT_S * (action[axis] + 0.1 * noise);
-            self.state[2 + axis] = velocity;
-            self.state[axis] += Self::DT_S * velocity;
+            *velocity = 0.9 * *velocity + Self::DT_S * (push + 0.1 * noise);
+            *place += Self::DT_S * *velocity;
         }
         self.steps_left -= 1;
         observation.copy_from_slice(&self.state);

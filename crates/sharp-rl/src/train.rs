@@ -373,15 +373,11 @@ impl<'a, E: Environment + Clone> Run<'a, E> {
                 run.begin_episode(index)?;
             }
         }
-        if run.state.next_evaluation == 0 {
-            run.state.next_evaluation = settings.evaluate_every;
-        }
         Ok(run)
     }
 
     /// Runs until something says stop.
     fn finish(mut self, observer: &mut Observer<'_>) -> Result<Trained, TrainError> {
-        let mut evaluated_at = None;
         let stop = loop {
             if self.state.env_steps >= self.settings.max_env_steps {
                 break Stop::Steps;
@@ -390,11 +386,9 @@ impl<'a, E: Environment + Clone> Run<'a, E> {
             self.learn()?;
             let mut evaluation = None;
             let mut reached = false;
-            if self.state.env_steps >= self.state.next_evaluation {
-                self.state.next_evaluation = self.state.env_steps + self.settings.evaluate_every;
+            if self.state.env_steps >= self.state.evaluated_at + self.settings.evaluate_every {
                 let (found, confirmed) = self.evaluate_and_keep()?;
                 (evaluation, reached) = (Some(found), confirmed);
-                evaluated_at = Some(self.state.env_steps);
             }
             let asked = observer(&self.progress(evaluation)).is_break();
             if reached {
@@ -405,7 +399,7 @@ impl<'a, E: Environment + Clone> Run<'a, E> {
             }
         };
         // A policy that was never evaluated could neither be returned nor compared.
-        let fresh = evaluated_at == Some(self.state.env_steps);
+        let fresh = self.state.evaluated_at == self.state.env_steps;
         if self.state.best.is_none() || (stop == Stop::Steps && !fresh) {
             self.evaluate_and_keep()?;
         }
@@ -549,6 +543,7 @@ impl<'a, E: Environment + Clone> Run<'a, E> {
         if !self.state.sac.is_finite() {
             return Err(TrainError::Diverged { what: "a weight", updates: self.state.updates });
         }
+        self.state.evaluated_at = self.state.env_steps;
         let mut evaluation = self.evaluate(self.settings.evaluation_episodes)?;
         let mut reached = match self.settings.stop {
             StopRule::Success { rate, .. } => evaluation.success_rate() >= rate,
