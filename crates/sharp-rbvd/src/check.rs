@@ -14,7 +14,7 @@ use crate::space::FreeSpace;
 #[non_exhaustive]
 pub enum Violation {
     /// A cell where the robot cannot be has a state.
-    #[error("{cell:?} has state {state:?} but no room for the robot")]
+    #[error("column {}, row {} has state {} but no room for the robot", cell.col, cell.row, state.0)]
     Blocked {
         /// The cell.
         cell: Cell,
@@ -22,17 +22,17 @@ pub enum Violation {
         state: StateId,
     },
     /// A cell has another state than the one it should: that of the nearest region.
-    #[error("{cell:?} has state {found:?}, nearest is region {expected:?}")]
+    #[error("column {}, row {} has state {}, nearest is the region of state {}", cell.col, cell.row, found.0, expected.0)]
     NotNearest {
         /// The cell.
         cell: Cell,
         /// Its state.
-        found: Option<StateId>,
+        found: StateId,
         /// The state of the nearest region.
         expected: StateId,
     },
     /// A state falls into pieces.
-    #[error("{state:?} is not connected: nothing leads from its region to {cell:?}")]
+    #[error("state {} is not connected: nothing leads from its region to column {}, row {}", state.0, cell.col, cell.row)]
     Disconnected {
         /// The state.
         state: StateId,
@@ -40,7 +40,7 @@ pub enum Violation {
         cell: Cell,
     },
     /// A cell has no state although one of the cells around it has.
-    #[error("{cell:?} has no state but a neighbour with one")]
+    #[error("column {}, row {} has no state but a neighbour with one", cell.col, cell.row)]
     Uncovered {
         /// The cell.
         cell: Cell,
@@ -121,8 +121,8 @@ fn check_nearest(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), Violation> {
         let start = frame.index(rbvd.region(state).representative);
         for index in space.flood(start, &mut seen, |index| nearest[index].1 == Some(state)) {
             let (cell, expected) = (frame.cell(index), state);
-            let found = rbvd.state_of(cell);
-            if found != Some(expected) {
+            // Cells without a state are the business of `check_coverage`.
+            if let Some(found) = rbvd.state_of(cell).filter(|&found| found != expected) {
                 return Err(Violation::NotNearest { cell, found, expected });
             }
         }

@@ -39,6 +39,8 @@ struct StoredRegion {
 pub(crate) enum StoreError {
     #[error("diagram has format version {0}, expected {VERSION}")]
     Version(u32),
+    #[error("diagram's frame has a resolution or an origin that is no place")]
+    Frame,
     #[error("diagram covers {found} cells, its frame has {expected}")]
     Length { found: usize, expected: usize },
     #[error("diagram names state {state}, has {count} states")]
@@ -74,20 +76,13 @@ impl TryFrom<StoredRbvd> for Rbvd {
         if stored.version != VERSION {
             return Err(StoreError::Version(stored.version));
         }
-        let states = stored.states()?;
-        let (frame, count) = (stored.frame, stored.regions.len());
-        for (position, portal) in stored.portals.iter().enumerate() {
-            let (low, high) = portal.between;
-            let in_order = portal.id == PortalId(position as u32)
-                && low < high
-                && (position == 0 || stored.portals[position - 1].between <= portal.between);
-            if !in_order || portal.cell.col >= frame.width || portal.cell.row >= frame.height {
-                return Err(StoreError::Portal(position));
-            }
-            if high.0 as usize >= count {
-                return Err(StoreError::State { state: high.0, count });
-            }
+        let resolution_m = stored.frame.resolution_m;
+        if !(resolution_m.is_finite() && resolution_m > 0.0 && stored.frame.origin.is_finite()) {
+            return Err(StoreError::Frame);
         }
+        let states = stored.states()?;
+        stored.check_portals()?;
+        let (frame, count) = (stored.frame, stored.regions.len());
         let regions = stored.regions.iter().enumerate();
         let regions = regions
             .map(|(position, region)| region.restore(position, &frame).ok_or(StoreError::Region(position)))
@@ -121,6 +116,23 @@ impl StoredRbvd {
         }
         let runs = self.cells.iter().map(|&(state, length)| (state.unwrap_or(NONE), length));
         Ok(runs.flat_map(|(state, length)| std::iter::repeat_n(state, length)).collect())
+    }
+
+    fn check_portals(&self) -> Result<(), StoreError> {
+        let (frame, count) = (&self.frame, self.regions.len());
+        for (position, portal) in self.portals.iter().enumerate() {
+            let (low, high) = portal.between;
+            let in_order = portal.id == PortalId(position as u32)
+                && low < high
+                && (position == 0 || self.portals[position - 1].between <= portal.between);
+            if !in_order || portal.cell.col >= frame.width || portal.cell.row >= frame.height {
+                return Err(StoreError::Portal(position));
+            }
+            if high.0 as usize >= count {
+                return Err(StoreError::State { state: high.0, count });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -176,6 +188,7 @@ mod tests {
             assert!(error.contains(message), "{from} -> {to}: {error}");
         };
         refused("version:1", "version:7", "format version 7");
+        refused("resolution_m:0.5", "resolution_m:0.0", "frame");
         refused("(None,10)", "(None,11)", "covers 37 cells, its frame has 36");
         refused("(Some(1),", "(Some(9),", "names state 9");
         refused("cells:[(11,1)]", "cells:[]", "region 0");

@@ -346,6 +346,25 @@ fn diagrams_of_random_maps_satisfy_the_definition() {
 }
 
 #[test]
+fn the_checker_finds_what_is_wrong() {
+    let drawing = "
+        #########
+        #A.....B#
+        #########";
+    let (sound, grid) = build(drawing, &RbvdSettings::default());
+    let field = DistanceField::new(&grid);
+    let spoilt = |col, row, state| {
+        let mut rbvd = sound.clone();
+        rbvd.states[rbvd.frame.index(Cell::new(col, row))] = state;
+        check_definition(&rbvd, &field).unwrap_err().to_string()
+    };
+    assert_eq!(spoilt(0, 0, 1), "column 0, row 0 has state 1 but no room for the robot");
+    assert_eq!(spoilt(3, 1, u32::MAX), "column 3, row 1 has no state but a neighbour with one");
+    assert_eq!(spoilt(3, 1, 1), "state 1 is not connected: nothing leads from its region to column 3, row 1");
+    assert_eq!(spoilt(4, 1, 1), "column 4, row 1 has state 1, nearest is the region of state 0");
+}
+
+#[test]
 fn neighbourhood_is_symmetric_and_portals_lie_on_their_borders() {
     arbtest::arbtest(|u| {
         let (grid, regions) = any_scene(u)?;
