@@ -361,7 +361,7 @@ mod tests {
     fn assert_derivative(name: &str, analytic: f32, numeric: f64) {
         let error = (f64::from(analytic) - numeric).abs();
         assert!(
-            error < 2e-2 * numeric.abs().max(0.3),
+            error < 2e-2 * numeric.abs().max(0.1),
             "{name}: {analytic} by hand, {numeric} by differences"
         );
     }

@@ -80,7 +80,7 @@ impl SacState {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LearnerKind {
-    /// The hand-written passes: the faster ones at every measured size.
+    /// The hand-written passes: the faster ones (see docs/algorithms/sac.md for how sure that is).
     #[default]
     Fused,
     /// burn's autodiff on its flex backend.
