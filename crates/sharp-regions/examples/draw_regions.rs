@@ -2,6 +2,8 @@
 //!
 //! Grey is free, black blocked, red a region, white its representative.
 
+#![allow(clippy::disallowed_methods, reason = "an example is a command: it reads its arguments")]
+
 use image::{Rgb, RgbImage};
 use sharp_regions::{GeometricSettings, detect_geometric};
 use sharp_space::floorplan::{FloorplanKind, generate};

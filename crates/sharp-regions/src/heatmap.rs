@@ -8,12 +8,6 @@ pub const HEADING_BINS: usize = 10;
 /// Stands for "no heading known" in [`Heatmap`]'s heading plane.
 pub(crate) const NO_HEADING: u8 = u8::MAX;
 
-/// The class of a heading, 0 to [`HEADING_BINS`] − 1, counted from −π.
-pub(crate) fn heading_bin(heading: Heading) -> u8 {
-    let share = (heading.radians() + std::f64::consts::PI) / std::f64::consts::TAU;
-    ((share * HEADING_BINS as f64) as usize).min(HEADING_BINS - 1) as u8
-}
-
 /// The middle of heading class `bin`.
 pub(crate) fn bin_heading(bin: u8) -> Heading {
     let share = (f64::from(bin) + 0.5) / HEADING_BINS as f64;
@@ -103,11 +97,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heading_classes_cover_the_circle() {
-        for bin in 0..HEADING_BINS as u8 {
-            assert_eq!(heading_bin(bin_heading(bin)), bin, "middle of class {bin}");
+    fn heading_classes_start_behind() {
+        let tenth = std::f64::consts::PI / 10.0;
+        for (bin, expected) in [(0, 11.0 * tenth), (5, tenth), (9, 9.0 * tenth)] {
+            let turn = bin_heading(bin).turn_to(Heading::new(expected));
+            assert!(turn.abs() < 1e-12, "middle of class {bin} is off by {turn}");
         }
-        assert_eq!(heading_bin(Heading::new(std::f64::consts::PI)), 9, "π itself");
-        assert_eq!(heading_bin(Heading::new(-3.14)), 0, "just above −π");
+    }
+
+    #[test]
+    fn values_that_are_no_share_are_clamped() {
+        let frame = GridFrame {
+            origin: sharp_space::Pose::new(0.0, 0.0, 0.0),
+            resolution_m: 1.0,
+            width: 3,
+            height: 1,
+        };
+        let heatmap = Heatmap::from_values(frame, vec![f32::NAN, -1.0, 7.0]);
+        assert_eq!(heatmap.values(), [0.0, 0.0, 1.0]);
     }
 }

@@ -147,8 +147,9 @@ fn peaks(frame: &GridFrame, heights: &[f32], inside: &[bool], ratio: f32) -> Vec
             let rank = |peak: u32| (Reverse(heights[peak as usize].to_bits()), peak);
             let (high, low) = if rank(a) < rank(b) { (a, b) } else { (b, a) };
             let (peak, pass) = (heights[low as usize], heights[index]);
-            // A step of one cell is noise: a slanted wall alone makes that much.
-            is_peak[low as usize] = peak >= ratio * pass && peak - pass > frame.resolution_m as f32;
+            // Less than a cell is noise: a slanted wall alone makes that much.
+            let noise = 0.9 * frame.resolution_m as f32;
+            is_peak[low as usize] = peak >= ratio * pass && peak - pass >= noise;
             hill[low as usize] = high;
         }
     }

@@ -1,0 +1,220 @@
+//! Training samples: labelled maps, kept on disk so that labelling can stop and go on.
+//!
+//! One safetensors file a map, named after its number. Each carries the recipe it was made by and a
+//! checksum of its tensors; a file whose recipe or checksum does not match is made again.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
+use serde::{Deserialize, Serialize};
+use sharp_space::floorplan::{FloorplanKind, generate};
+use sharp_space::{DistanceField, GridFrame, OccupancyGrid, Pose, Seed};
+use thiserror::Error;
+
+use crate::image::{Image, PIXEL_M};
+use crate::labels::{FINE_BINS, LabelRobot, LabelSettings, Labels, label_map};
+
+const FORMAT: u32 = 1;
+
+/// A labelled map.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    pub image: Image,
+    pub labels: Labels,
+}
+
+/// A map of a dataset, and everything its labels depend on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Recipe {
+    format: u32,
+    pub kind: FloorplanKind,
+    pub number: u64,
+    pub size_m: f64,
+    pub resolution_m: f64,
+    half_length_m: f64,
+    half_width_m: f64,
+    radius_m: f64,
+    labels: LabelSettings,
+    seed: Seed,
+}
+
+/// Why a dataset could not be read or written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DatasetError {
+    /// The file system refused.
+    #[error("cannot {action} {path}: {error}", path = path.display())]
+    File {
+        /// What was tried.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The reason.
+        error: std::io::Error,
+    },
+}
+
+impl Recipe {
+    pub(crate) fn new(
+        kind: FloorplanKind,
+        number: u64,
+        robot: &LabelRobot,
+        labels: LabelSettings,
+        seed: Seed,
+    ) -> Self {
+        Self {
+            format: FORMAT,
+            kind,
+            number,
+            size_m: 15.0,
+            // 220 cells: no whole number of cells is a pixel, as with most real maps.
+            resolution_m: 15.0 / 220.0,
+            half_length_m: robot.footprint.half_length_m(),
+            half_width_m: robot.footprint.half_width_m(),
+            radius_m: robot.steering.radius_m(),
+            labels,
+            seed,
+        }
+    }
+
+    /// The map, without its labels.
+    pub(crate) fn map(&self) -> OccupancyGrid {
+        let mut rng = self.seed.stream("floorplan", self.number);
+        generate(self.kind, self.size_m, self.resolution_m, &mut rng)
+    }
+
+    /// Makes the sample.
+    pub(crate) fn make(&self, robot: &LabelRobot) -> Sample {
+        let grid = self.map();
+        let image = Image::new(&grid, &DistanceField::new(&grid));
+        let labels = label_map(&grid, robot, &self.labels, self.seed.child("labels", self.number));
+        Sample { image, labels }
+    }
+
+    /// The sample from `folder` if it is there and sound, else a new one, which is then stored.
+    pub(crate) fn load_or_make(&self, robot: &LabelRobot, folder: &Path) -> Result<Sample, DatasetError> {
+        let path = folder.join(format!("map-{:04}.safetensors", self.number));
+        if let Some(sample) = std::fs::read(&path).ok().and_then(|bytes| self.read(&bytes)) {
+            return Ok(sample);
+        }
+        let sample = self.make(robot);
+        write_whole(&path, &self.to_bytes(&sample))?;
+        Ok(sample)
+    }
+
+    fn to_bytes(&self, sample: &Sample) -> Vec<u8> {
+        let bytes = |plane: &[f32]| plane.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        let planes = [
+            ("blocked", bytes(&sample.image.blocked)),
+            ("clearance", bytes(&sample.image.clearance)),
+            ("visits", bytes(&sample.labels.visits)),
+        ];
+        let frame = &sample.image.frame;
+        let shape = vec![frame.height, frame.width];
+        let mut views: Vec<_> = planes
+            .iter()
+            .map(|(name, data)| (*name, TensorView::new(Dtype::F32, shape.clone(), data)))
+            .collect();
+        let shape = vec![frame.height, frame.width, FINE_BINS];
+        views.push(("headings", TensorView::new(Dtype::U8, shape, &sample.labels.headings)));
+        let views = views.into_iter().map(|(name, view)| (name, view.expect("one value a pixel")));
+        let note = Note {
+            recipe: self.clone(),
+            solved: sample.labels.solved,
+            checksum: checksum(planes.iter().map(|(_, data)| data.as_slice()), &sample.labels.headings),
+        };
+        let json = serde_json::to_string(&note).expect("a note has no keys that are not text");
+        let metadata = HashMap::from([("sharp.sample".to_owned(), json)]);
+        serialize(views, Some(metadata)).expect("names are unique")
+    }
+
+    /// The sample in `bytes`, or `None` if it is not the one of this recipe or is damaged.
+    fn read(&self, bytes: &[u8]) -> Option<Sample> {
+        let (_, metadata) = SafeTensors::read_metadata(bytes).ok()?;
+        let note: Note = serde_json::from_str(metadata.metadata().as_ref()?.get("sharp.sample")?).ok()?;
+        let tensors = SafeTensors::deserialize(bytes).ok()?;
+        let data = |name| tensors.tensor(name).map(|view| view.data()).ok();
+        let planes = [data("blocked")?, data("clearance")?, data("visits")?];
+        let headings = data("headings")?;
+        if note.recipe != *self || note.checksum != checksum(planes.into_iter(), headings) {
+            return None;
+        }
+        let frame = self.frame();
+        let floats = |bytes: &[u8]| -> Option<Vec<f32>> {
+            let values: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|&b| f32::from_le_bytes(b)).collect();
+            (values.len() == frame.len()).then_some(values)
+        };
+        let [blocked, clearance, visits] = planes;
+        let image = Image { frame, blocked: floats(blocked)?, clearance: floats(clearance)? };
+        let headings = headings.to_vec();
+        let labels = Labels { frame, visits: floats(visits)?, headings, solved: note.solved };
+        (labels.headings.len() == frame.len() * FINE_BINS).then_some(Sample { image, labels })
+    }
+
+    fn frame(&self) -> GridFrame {
+        let side = (self.size_m / PIXEL_M).round() as usize;
+        GridFrame { origin: Pose::new(0.0, 0.0, 0.0), resolution_m: PIXEL_M, width: side, height: side }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Note {
+    recipe: Recipe,
+    solved: usize,
+    checksum: String,
+}
+
+fn checksum<'a>(planes: impl Iterator<Item = &'a [u8]>, headings: &[u8]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for plane in planes {
+        hasher.update(plane);
+    }
+    hasher.update(headings);
+    hasher.finalize().to_hex().to_string()
+}
+
+/// Writes a file beside its final name and renames it: readers see all of it or nothing.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
+    let failed = |action| move |error| DatasetError::File { action, path: path.to_owned(), error };
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(failed("create the folder of"))?;
+    }
+    let partial = path.with_extension("partial");
+    std::fs::write(&partial, bytes).map_err(failed("write"))?;
+    std::fs::rename(&partial, path).map_err(failed("rename"))
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_motion::Steering;
+    use sharp_space::Footprint;
+
+    use super::*;
+
+    fn robot() -> LabelRobot {
+        let footprint = Footprint::rectangle(0.3, 0.2).unwrap();
+        LabelRobot { footprint, steering: Steering::RotateTranslate }
+    }
+
+    fn recipe() -> Recipe {
+        let labels = LabelSettings { goals: 2, starts: 3, ..LabelSettings::default() };
+        Recipe::new(FloorplanKind::Gap, 3, &robot(), labels, Seed(1))
+    }
+
+    #[test]
+    fn samples_survive_a_round_trip_and_damage_is_noticed() {
+        let recipe = recipe();
+        let sample = recipe.make(&robot());
+        let bytes = recipe.to_bytes(&sample);
+        let read = recipe.read(&bytes).expect("an undamaged sample is read");
+        assert_eq!(read.labels, sample.labels);
+        assert_eq!(read.image.blocked, sample.image.blocked);
+        let mut damaged = bytes.clone();
+        *damaged.last_mut().unwrap() ^= 1;
+        assert!(recipe.read(&damaged).is_none(), "one bit is wrong");
+        assert!(recipe.read(&bytes[..bytes.len() / 2]).is_none(), "cut in half");
+        let other = Recipe { seed: Seed(2), ..recipe };
+        assert!(other.read(&bytes).is_none(), "made by another recipe");
+    }
+}

@@ -1,0 +1,28 @@
+//! Where tensors are computed.
+
+use burn::tensor::Device;
+use serde::{Deserialize, Serialize};
+
+/// The backend that computes; chosen at run time, never from the environment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum ComputeDevice {
+    /// burn's own CPU backend.
+    #[default]
+    Flex,
+    /// The older CPU backend: the same results, but ten to twenty times slower in training.
+    #[cfg(feature = "ndarray")]
+    Ndarray,
+}
+
+impl ComputeDevice {
+    pub(crate) fn device(self) -> Device {
+        match self {
+            Self::Flex => Device::flex(),
+            #[cfg(feature = "ndarray")]
+            #[allow(deprecated, reason = "kept as a second opinion for as long as burn ships it")]
+            Self::Ndarray => Device::ndarray(),
+        }
+    }
+}
