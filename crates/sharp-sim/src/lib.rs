@@ -41,7 +41,6 @@ pub use controller::{Aim, WaypointController};
 pub use kinematic::KinematicSim;
 pub use noise::{ActionNoise, EpisodeNoise, NoiseError, NoiseModel, SlipperyPatches};
 pub use planar::PlanarSim;
-pub use rectangles::{CellRectangle, merge_blocked_cells};
 pub use robot::{Drive, RobotError, RobotModel};
 pub use simulator::{AnySim, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
 pub use state::{Command, RobotState};

@@ -7,21 +7,20 @@ use sharp_space::{Cell, OccupancyGrid};
 
 /// A block of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CellRectangle {
+pub(crate) struct CellRectangle {
     /// Its lower-left cell.
-    pub corner: Cell,
+    pub(crate) corner: Cell,
     /// Number of columns.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Number of rows.
-    pub height: usize,
+    pub(crate) height: usize,
 }
 
 /// Covers everything in `grid` that is not free by rectangles that do not overlap.
 ///
 /// Greedy, in row-major order: each rectangle grows to the right, then upwards or the other way
 /// round, whichever covers more.
-#[must_use]
-pub fn merge_blocked_cells(grid: &OccupancyGrid) -> Vec<CellRectangle> {
+pub(crate) fn merge_blocked_cells(grid: &OccupancyGrid) -> Vec<CellRectangle> {
     let frame = grid.frame();
     let mut open: Vec<bool> = (0..frame.len()).map(|i| !grid.is_free(frame.cell(i))).collect();
     let mut rectangles = Vec::new();

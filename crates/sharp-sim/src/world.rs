@@ -3,13 +3,12 @@
 use sharp_space::{DistanceField, Footprint, FootprintChecker, GridFrame, OccupancyGrid, Pose, Vector};
 
 use crate::convert::Obstacles;
-use crate::rectangles::{CellRectangle, merge_blocked_cells};
+use crate::rectangles::merge_blocked_cells;
 
 /// The map around a robot of a given outline; shared by all simulators and their forks.
 #[derive(Clone, Debug)]
 pub struct World {
     checker: FootprintChecker,
-    rectangles: Vec<CellRectangle>,
     obstacles: Obstacles,
     cover: Cover,
 }
@@ -19,11 +18,9 @@ impl World {
     /// does the border of the grid.
     #[must_use]
     pub fn new(grid: &OccupancyGrid, footprint: Footprint) -> Self {
-        let rectangles = merge_blocked_cells(grid);
         Self {
-            obstacles: Obstacles::new(grid.frame(), &rectangles),
             checker: FootprintChecker::new(grid, footprint),
-            rectangles,
+            obstacles: Obstacles::new(grid.frame(), &merge_blocked_cells(grid)),
             cover: Cover::new(&footprint),
         }
     }
@@ -44,12 +41,6 @@ impl World {
     #[must_use]
     pub const fn field(&self) -> &DistanceField {
         self.checker.field()
-    }
-
-    /// The blocked cells, merged.
-    #[must_use]
-    pub fn rectangles(&self) -> &[CellRectangle] {
-        &self.rectangles
     }
 
     /// How far every point of the outline at `pose` can certainly move before it meets an obstacle,
