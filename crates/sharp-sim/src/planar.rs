@@ -33,8 +33,7 @@ pub struct PlanarSim {
     wheels: Wheels,
     body: Body,
     engine: Engine,
-    /// Work space of the engine; holds no state.
-    pipeline: PhysicsPipeline,
+    workspace: Workspace,
     guard: ContactGuard,
     state: RobotState,
 }
@@ -52,7 +51,7 @@ impl PlanarSim {
         Self {
             wheels: Wheels::new(robot),
             engine: Engine::new(&world, &body, &state),
-            pipeline: PhysicsPipeline::new(),
+            workspace: Workspace::default(),
             guard: ContactGuard::default(),
             body,
             state,
@@ -75,7 +74,7 @@ impl Clone for PlanarSim {
             wheels: self.wheels,
             body: self.body,
             engine: self.engine.clone(),
-            pipeline: PhysicsPipeline::new(),
+            workspace: Workspace::default(),
             guard: self.guard,
             state: self.state,
         }
@@ -92,7 +91,7 @@ impl Simulator for PlanarSim {
     fn reset(&mut self, state: RobotState) {
         self.state = state;
         self.engine = Engine::new(&self.world, &self.body, &state);
-        self.pipeline = PhysicsPipeline::new();
+        self.workspace = Workspace::default();
         self.guard.forget();
     }
 
@@ -100,7 +99,7 @@ impl Simulator for PlanarSim {
         self.wheels.follow(&mut self.state, command, dt_s);
         let push = self.wheels.push(&self.state, dt_s);
         let before = self.state.pose;
-        let touched = self.engine.step(&mut self.pipeline, push.velocity, push.yaw_rate_radps, dt_s);
+        let touched = self.engine.step(&mut self.workspace, push.velocity, push.yaw_rate_radps, dt_s);
         self.read_state();
         let after = self.state.pose;
         let turned_rad = before.heading.turn_to(after.heading).abs();
@@ -120,6 +119,13 @@ struct Body {
     footprint: Footprint,
     mass_kg: f64,
     yaw_inertia_kgm2: f64,
+}
+
+/// Buffers that the engine reuses; no state of the simulation.
+#[derive(Default)]
+struct Workspace {
+    pipeline: PhysicsPipeline,
+    ccd_solver: CCDSolver,
 }
 
 /// Everything in the engine that changes; cloning it forks the simulation.
@@ -175,13 +181,13 @@ impl Engine {
     }
 
     /// Pushes the body, moves everything on and returns true if the body was pushed back.
-    fn step(&mut self, pipeline: &mut PhysicsPipeline, velocity: Vector, yaw: f64, dt_s: f64) -> bool {
+    fn step(&mut self, workspace: &mut Workspace, velocity: Vector, yaw: f64, dt_s: f64) -> bool {
         let body = &mut self.bodies[self.robot];
         let change = body.rotation().transform_vector(engine_vector(velocity));
         body.set_linvel(body.linvel() + change, true);
         body.set_angvel(body.angvel() + yaw as f32, true);
         self.parameters.dt = dt_s as f32;
-        pipeline.step(
+        workspace.pipeline.step(
             EngineVector::ZERO,
             &self.parameters,
             &mut self.islands,
@@ -192,7 +198,7 @@ impl Engine {
             &mut self.impulse_joints,
             &mut self.multibody_joints,
             &mut self.soft_bodies,
-            &mut CCDSolver::new(),
+            &mut workspace.ccd_solver,
             &(),
             &(),
         );
