@@ -17,7 +17,11 @@ pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
         unknown_free: args.unknown == Unknown::Free,
         allow_outside: args.allow_outside,
     };
-    Ok(load(&args.map, &options)?)
+    let map = load(&args.map, &options)?;
+    for warning in &map.warnings {
+        eprintln!("warning: {warning}");
+    }
+    Ok(map)
 }
 
 /// The robot called `name`, or described by the file of that name.

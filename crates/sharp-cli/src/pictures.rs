@@ -21,15 +21,21 @@ pub(crate) fn write(folder: &Path, name: &str, svg: &str) -> Result<(), Failure>
 }
 
 /// The heat map of criticality with the outlines of the regions made from it.
-pub(crate) fn regions(grid: &OccupancyGrid, heatmap: &Heatmap, rbvd: &Rbvd) -> String {
-    let regions: Vec<Region> = rbvd.states().map(|state| rbvd.region(state).clone()).collect();
-    Scene::new(grid).heat_map(heatmap.values()).regions(&regions).to_svg()
+pub(crate) fn regions(grid: &OccupancyGrid, heatmap: &Heatmap, regions: &[Region]) -> String {
+    Scene::new(grid).heat_map(heatmap.values()).regions(regions).to_svg()
+}
+
+/// The regions of all states.
+pub(crate) fn regions_of(rbvd: &Rbvd) -> Vec<Region> {
+    rbvd.states().map(|state| rbvd.region(state).clone()).collect()
 }
 
 /// Cells coloured by state, with endpoints and options.
 pub(crate) fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> String {
     let (rbvd, options) = (&abstraction.rbvd, &abstraction.options);
-    let regions: Vec<Region> = rbvd.states().map(|state| rbvd.region(state).clone()).collect();
+    let regions = regions_of(rbvd);
+    let frame = grid.frame();
+    let labels: Vec<(u32, Point)> = rbvd.states().zip(&regions).map(|(state, region)| (state.0, region.center(frame))).collect();
     let centers: Vec<Point> = options.endpoints().iter().map(|endpoint| endpoint.center).collect();
     let radius_m = options.endpoints().first().map_or(0.3, |endpoint| endpoint.radius_m);
     let arrows: Vec<(Point, Point)> = options
@@ -42,6 +48,7 @@ pub(crate) fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> St
         .regions(&regions)
         .options(&arrows)
         .endpoints(&centers, radius_m)
+        .labels(&labels)
         .to_svg()
 }
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_plan::{AbstractionFile, FORMAT, OptionLibrary, Workspace, hash, map_hash};
 use sharp_rbvd::{CellMetric, Rbvd, RbvdSettings};
-use sharp_regions::{Heatmap, PredictSettings, RegionPredictor, Source, predict_regions};
-use sharp_sim::NoiseModel;
+use sharp_regions::{Heatmap, RegionPredictor, RegionSettings, Source, geometric_regions, predict_regions};
+use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{Cell, Region, RegionId};
 
 use crate::args::{AbstractionArgs, Kind, Learning, Metric};
@@ -55,7 +55,8 @@ pub(crate) fn abstraction(
     let (heatmap, regions, source) = regions(workspace, &args.regions)?;
     stopwatch.enter("abstraction");
     let rbvd = diagram(workspace, &regions, args.metric)?;
-    let settings = OptionSettings::for_robot(workspace.robot.goal_tolerance_m);
+    let settings =
+        OptionSettings { endpoint_radius_m: workspace.robot.goal_tolerance_m, ..OptionSettings::default() };
     let file = AbstractionFile::new(map, source.clone(), args.options.into(), settings, rbvd);
     if let Some(path) = path {
         file.save(&path)?;
@@ -77,17 +78,16 @@ pub(crate) fn regions(
     workspace: &Workspace,
     choice: &str,
 ) -> Result<(Option<Heatmap>, Vec<Region>, String), Failure> {
-    let settings = PredictSettings::default();
-    let footprint = &workspace.robot.footprint;
-    let predictor = match choice {
-        "net" => Some(RegionPredictor::shipped_for(footprint)),
-        "geometric" => None,
+    let settings = RegionSettings::default();
+    let (grid, footprint) = (&workspace.grid, &workspace.robot.footprint);
+    let prediction = match choice {
+        "net" => geometric_regions(grid, footprint, &settings.geometric),
+        "geometric" => geometric_regions(grid, footprint, &settings.geometric),
         file => {
             let regions = regions_from_file(workspace, file)?;
             return Ok((None, regions, file.to_owned()));
         }
     };
-    let prediction = predict_regions(&workspace.grid, footprint, predictor.as_ref(), &settings);
     let source = match prediction.source {
         Source::Network => "net",
         Source::Geometric => "geometric",
@@ -115,9 +115,14 @@ fn regions_from_file(workspace: &Workspace, file: &str) -> Result<Vec<Region>, F
     Ok(regions)
 }
 
-fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
+/// How the diagram is built for the robot of `workspace`: half a cell is what distances may be wrong by.
+pub(crate) fn rbvd_settings(workspace: &Workspace) -> RbvdSettings {
     let resolution_m = workspace.grid.frame().resolution_m;
-    let mut settings = RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m);
+    RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m)
+}
+
+fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
+    let mut settings = rbvd_settings(workspace);
     if metric == Metric::Paper {
         settings.metric = CellMetric::Euclidean;
     }

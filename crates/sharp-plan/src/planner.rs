@@ -194,7 +194,8 @@ impl<'a> Planner<'a> {
         };
         let start_heading = match id {
             LegId::First(_) | LegId::Direct => Some(self.query.start.heading),
-            LegId::Option(_) | LegId::Last(..) => None,
+            LegId::Option(option) => source.and_then(|end| approach(end, option.through().unwrap_or(option.to()))),
+            LegId::Last(_, state) => source.and_then(|end| approach(end, state)),
         };
         let request = GuideRequest {
             start: GuideEnd { position: candidate.start, heading: start_heading },

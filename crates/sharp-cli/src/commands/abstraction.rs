@@ -20,7 +20,7 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
 
     built.file.save(&args.out.join("abstraction.ron"))?;
     if let Some(heatmap) = &built.heatmap {
-        pictures::write(&args.out, "regions", &pictures::regions(&map.grid, heatmap, &built.file.rbvd))?;
+        pictures::write(&args.out, "regions", &pictures::regions(&map.grid, heatmap, &pictures::regions_of(&built.file.rbvd)))?;
     }
     pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
     let route = geojson::route(&abstraction, workspace.robot.max_speed_mps);

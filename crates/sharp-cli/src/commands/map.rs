@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 use sharp_plan::Workspace;
-use sharp_rbvd::{Rbvd, RbvdSettings};
+use sharp_rbvd::Rbvd;
 use sharp_space::Occupancy;
 
 use crate::args::Map;
-use crate::input;
+use crate::{input, pipeline};
 use crate::outcome::{Exit, Failure, to_json, say};
 use crate::report::MapReport;
 
@@ -68,9 +68,7 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
         Map::Check { map, robot } => {
             let map = input::map(map)?;
             let workspace = Workspace::new(map.grid, input::robot(robot)?);
-            let resolution_m = workspace.grid.frame().resolution_m;
-            let settings = RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m);
-            let rbvd = Rbvd::build(workspace.checker.field(), &[], &settings).ok();
+            let rbvd = Rbvd::build(workspace.checker.field(), &[], &pipeline::rbvd_settings(&workspace)).ok();
             let check = Check {
                 schema: "sharp.map.check/1",
                 robot: workspace.robot.name.clone(),

@@ -155,7 +155,7 @@ fn write_plan(
     plan.save(folder, &built.file)?;
     sharp_maps::save_ros(&plan.workspace.grid, &folder.join("map.yaml"))?;
     if let Some(heatmap) = &built.heatmap {
-        pictures::write(folder, "regions", &pictures::regions(&plan.workspace.grid, heatmap, &built.file.rbvd))?;
+        pictures::write(folder, "regions", &pictures::regions(&plan.workspace.grid, heatmap, &pictures::regions_of(&built.file.rbvd)))?;
     }
     pictures::write(folder, "abstraction", &pictures::abstraction(&plan.workspace.grid, &plan.abstraction))?;
     pictures::write(folder, "plan", &pictures::plan(plan, query, &[]))?;
