@@ -28,7 +28,7 @@ pub struct ExtractSettings {
 
 impl Default for ExtractSettings {
     fn default() -> Self {
-        Self { threshold: 0.5, area_min_m2: 0.15, extent_max_m: 2.5, disc_spacing_m: 2.5, disc_radius_m: 0.6 }
+        Self { threshold: 0.4, area_min_m2: 0.15, extent_max_m: 2.5, disc_spacing_m: 2.5, disc_radius_m: 0.6 }
     }
 }
 

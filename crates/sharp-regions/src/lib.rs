@@ -32,6 +32,7 @@ mod labels;
 mod loss;
 mod predict;
 mod score;
+mod shipped;
 mod skeleton;
 mod store;
 mod train;

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use sharp_space::{Cell, DistanceField, Footprint, GridFrame, OccupancyGrid, Region, Vector};
 
 use crate::device::ComputeDevice;
-use crate::extract::{ExtractSettings, components, extract_regions};
+use crate::extract::{ExtractSettings, extract_regions};
 use crate::geometric::{GeometricSettings, detect_geometric};
 use crate::heatmap::{Heatmap, NO_HEADING};
 use crate::image::{Image, PIXEL_M, sample_plane};
@@ -33,9 +33,11 @@ pub struct RegionSettings {
     pub extract: ExtractSettings,
     /// The fallback.
     pub geometric: GeometricSettings,
-    /// The network's regions are used if the parts of the map that have one hold this share of the
-    /// robot's free space.
-    pub covered_min: f64,
+    /// A place is in reach of a region if the way there is at most this long, metres.
+    pub reach_m: f64,
+    /// The network's regions are used unless they leave this share more of the robot's free space
+    /// out of reach than those of the fallback.
+    pub unreached_max: f64,
     /// Maps with more pixels of 0.125 m than this are left to the fallback; 16 million take the
     /// network about half a minute.
     pub pixels_max: usize,
@@ -46,7 +48,8 @@ impl Default for RegionSettings {
         Self {
             extract: ExtractSettings::default(),
             geometric: GeometricSettings::default(),
-            covered_min: 0.5,
+            reach_m: 6.0,
+            unreached_max: 0.2,
             pixels_max: 16_000_000,
         }
     }
@@ -75,9 +78,9 @@ pub struct Prediction {
 
 /// The critical regions of `grid` for a robot with `footprint`.
 ///
-/// Falls back to the geometric detector if the network's regions are missing from most of the
-/// robot's free space, are under a quarter as many as the detector's, or the map is too large. A map
-/// without free space, or an open hall, has no regions.
+/// Falls back to the geometric detector if the network's regions leave much of the robot's free
+/// space out of reach that the detector's would not, or if the map is too large. A map without free
+/// space, or an open hall, has no regions.
 #[must_use]
 pub fn predict_regions(
     grid: &OccupancyGrid,
@@ -85,18 +88,21 @@ pub fn predict_regions(
     predictor: &RegionPredictor,
     settings: &RegionSettings,
 ) -> Prediction {
-    let clearance = DistanceField::new(grid);
-    let geometric = detect_geometric(&clearance, footprint, &settings.geometric);
     let pixels = grid.frame().width_m() / PIXEL_M * (grid.frame().height_m() / PIXEL_M);
     if pixels > settings.pixels_max as f64 {
-        return from_geometry(grid.frame(), geometric);
+        return geometric_regions(grid, footprint, &settings.geometric);
     }
+    let clearance = DistanceField::new(grid);
     let heatmap = predictor.heatmap(grid, &clearance);
-    let reach = footprint.inscribed_radius_m();
-    let regions = extract_regions(&heatmap, &clearance, reach, &settings.extract);
-    let covered = covered_share(&regions, &clearance, reach);
-    if regions.is_empty() || 4 * regions.len() < geometric.len() || covered < settings.covered_min {
-        return Prediction { heatmap, regions: geometric, source: Source::Geometric };
+    let min_clearance_m = footprint.inscribed_radius_m();
+    let regions = extract_regions(&heatmap, &clearance, min_clearance_m, &settings.extract);
+    let reached = |regions: &[Region]| reached_share(regions, &clearance, min_clearance_m, settings.reach_m);
+    let enough = reached(&regions) + settings.unreached_max;
+    if enough < 1.0 {
+        let geometric = detect_geometric(&clearance, footprint, &settings.geometric);
+        if reached(&geometric) > enough {
+            return Prediction { heatmap, regions: geometric, source: Source::Geometric };
+        }
     }
     Prediction { heatmap, regions, source: Source::Network }
 }
@@ -108,23 +114,35 @@ pub fn geometric_regions(
     footprint: &Footprint,
     settings: &GeometricSettings,
 ) -> Prediction {
-    from_geometry(grid.frame(), detect_geometric(&DistanceField::new(grid), footprint, settings))
+    let regions = detect_geometric(&DistanceField::new(grid), footprint, settings);
+    Prediction { heatmap: Heatmap::from_regions(*grid.frame(), &regions), regions, source: Source::Geometric }
 }
 
-fn from_geometry(frame: &GridFrame, regions: Vec<Region>) -> Prediction {
-    Prediction { heatmap: Heatmap::from_regions(*frame, &regions), regions, source: Source::Geometric }
-}
-
-/// The share of the robot's free space that is connected to a region.
-fn covered_share(regions: &[Region], clearance: &DistanceField, min_clearance_m: f64) -> f64 {
+/// The share of the robot's free space from which a region is at most `reach_m` away, along the grid.
+fn reached_share(regions: &[Region], clearance: &DistanceField, min_clearance_m: f64, reach_m: f64) -> f64 {
     let frame = clearance.frame();
-    let open: Vec<Cell> =
-        (0..frame.len()).map(|i| frame.cell(i)).filter(|&c| clearance.at(c) >= min_clearance_m).collect();
-    let mut has_region = vec![false; frame.len()];
-    regions.iter().for_each(|region| has_region[frame.index(region.representative)] = true);
-    let parts = components(frame, &open, &mut vec![false; frame.len()]);
-    let covered = parts.iter().filter(|part| part.iter().any(|&cell| has_region[frame.index(cell)]));
-    covered.map(Vec::len).sum::<usize>() as f64 / open.len().max(1) as f64
+    let open = |cell: Cell| clearance.at(cell) >= min_clearance_m;
+    let mut seen = vec![false; frame.len()];
+    let mut wave: Vec<Cell> = Vec::new();
+    for &cell in regions.iter().flat_map(|region| &region.cells) {
+        if !std::mem::replace(&mut seen[frame.index(cell)], true) {
+            wave.push(cell);
+        }
+    }
+    let mut reached = wave.len();
+    for _ in 0..(reach_m / frame.resolution_m) as usize {
+        let mut next = Vec::new();
+        for cell in wave.iter().flat_map(|&cell| frame.neighbors8(cell)) {
+            if !seen[frame.index(cell)] && open(cell) {
+                seen[frame.index(cell)] = true;
+                next.push(cell);
+            }
+        }
+        reached += next.len();
+        wave = next;
+    }
+    let all = (0..frame.len()).filter(|&index| open(frame.cell(index))).count();
+    reached as f64 / all.max(1) as f64
 }
 
 /// A trained network, ready to predict.
@@ -351,6 +369,18 @@ mod tests {
                 &drawing[..drawing.len().min(9)]
             );
         }
+    }
+
+    #[test]
+    fn reach_is_measured_along_free_space() {
+        let drawing = "#########\n#...#...#\n#...#...#\n#...#...#\n#########";
+        let grid = OccupancyGrid::from_ascii(1.0, drawing).unwrap();
+        let clearance = DistanceField::new(&grid);
+        let region = Region::new(sharp_space::RegionId(0), vec![Cell::new(1, 1)], &clearance).unwrap();
+        let reached = |reach_m| reached_share(&[region.clone()], &clearance, 0.5, reach_m);
+        assert_eq!(reached(0.0), 1.0 / 18.0, "the region itself");
+        assert_eq!(reached(1.0), 4.0 / 18.0, "its neighbours too");
+        assert_eq!(reached(100.0), 0.5, "never the room behind the wall");
     }
 
     #[test]

@@ -83,6 +83,37 @@ impl Default for TrainSettings {
     }
 }
 
+impl TrainSettings {
+    /// Too small to be of use, but done in seconds: for trying the machinery.
+    #[must_use]
+    pub fn tiny() -> Self {
+        Self {
+            network: UNetConfig { width: 8, levels: 2, ..UNetConfig::compact() },
+            maps: 4,
+            labels: LabelSettings { goals: 6, starts: 8, ..LabelSettings::default() },
+            steps: 40,
+            batch: 2,
+            learning_rate: 1e-2,
+            ..Self::default()
+        }
+    }
+
+    /// The paper's numbers: 20 maps, 100 goals, 50 starts each, 50,000 steps of Adam at 1e-4; days
+    /// on a CPU.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self {
+            network: UNetConfig::paper(),
+            maps: 20,
+            labels: LabelSettings { goals: 100, starts: 50, ..LabelSettings::default() },
+            steps: 50_000,
+            batch: 5,
+            learning_rate: 1e-4,
+            ..Self::default()
+        }
+    }
+}
+
 /// What training tells while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
