@@ -377,7 +377,7 @@ mod tests {
         let grid = OccupancyGrid::from_ascii(1.0, drawing).unwrap();
         let clearance = DistanceField::new(&grid);
         let region = Region::new(sharp_space::RegionId(0), vec![Cell::new(1, 1)], &clearance).unwrap();
-        let reached = |reach_m| reached_share(&[region.clone()], &clearance, 0.5, reach_m);
+        let reached = |reach_m| reached_share(std::slice::from_ref(&region), &clearance, 0.5, reach_m);
         assert_eq!(reached(0.0), 1.0 / 18.0, "the region itself");
         assert_eq!(reached(1.0), 4.0 / 18.0, "its neighbours too");
         assert_eq!(reached(100.0), 0.5, "never the room behind the wall");
