@@ -48,7 +48,7 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
         Command::Run(args) => commands::run::run(args, cli.seed, cli.json),
         Command::Serve(args) => commands::serve::run(args),
         Command::Abstract(args) => commands::abstraction::run(args, cli.json),
-        Command::Regions(_) => Ok(Exit::No),
+        Command::Regions(command) => commands::regions::run(command, cli.seed, cli.json),
         Command::Map(command) => commands::map::run(command, cli.json),
         Command::Library(command) => commands::library::run(command, cli.json),
         Command::Eval(args) => commands::eval::run(args, cli.seed, cli.json),

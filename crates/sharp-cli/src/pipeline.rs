@@ -23,8 +23,6 @@ pub(crate) struct Built {
     pub(crate) source: String,
     /// The heat map, unless the abstraction was loaded or the regions came from a file.
     pub(crate) heatmap: Option<Heatmap>,
-    /// True if a library had it already.
-    pub(crate) loaded: bool,
 }
 
 impl From<Kind> for OptionKind {
@@ -49,7 +47,7 @@ pub(crate) fn abstraction(
         stopwatch.enter("abstraction");
         let file = AbstractionFile::load(path, &map)?;
         stopwatch.stop();
-        return Ok(Built { source: file.regions.clone(), file, heatmap: None, loaded: true });
+        return Ok(Built { source: file.regions.clone(), file, heatmap: None });
     }
     stopwatch.enter("regions");
     let (heatmap, regions, source) = regions(workspace, &args.regions)?;
@@ -62,7 +60,7 @@ pub(crate) fn abstraction(
         file.save(&path)?;
     }
     stopwatch.stop();
-    Ok(Built { file, source, heatmap, loaded: false })
+    Ok(Built { file, source, heatmap })
 }
 
 fn cache_name(args: &AbstractionArgs) -> String {
@@ -81,7 +79,7 @@ pub(crate) fn regions(
     let settings = RegionSettings::default();
     let (grid, footprint) = (&workspace.grid, &workspace.robot.footprint);
     let prediction = match choice {
-        "net" => geometric_regions(grid, footprint, &settings.geometric),
+        "net" => predict_regions(grid, footprint, &shipped(&workspace.robot), &settings),
         "geometric" => geometric_regions(grid, footprint, &settings.geometric),
         file => {
             let regions = regions_from_file(workspace, file)?;
@@ -93,6 +91,11 @@ pub(crate) fn regions(
         Source::Geometric => "geometric",
     };
     Ok((Some(prediction.heatmap), prediction.regions, source.to_owned()))
+}
+
+/// The shipped network for `robot`, or the one trained for the footprint nearest in width.
+pub(crate) fn shipped(robot: &RobotModel) -> RegionPredictor {
+    RegionPredictor::shipped_for(&robot.footprint)
 }
 
 /// A region of one cell's neighbourhood around each centre listed in a file.

@@ -16,8 +16,10 @@ use crate::plan::Plan;
 use crate::planner::{Planner, Query, SearchSettings};
 use crate::policy::{DecisionScratch, Follower, GuideView, OptionPolicy, PolarWaypoint};
 
-/// Actions outside the allowed states before recovery begins: one or two are noise.
+/// Actions outside the allowed states and off the guide before recovery begins: a few are noise.
 const STRAY_ACTIONS_MAX: u32 = 4;
+/// A robot nearer to its guide than this is on its way, whatever state it is in, metres.
+const OFF_GUIDE_M: f64 = 0.6;
 /// Actions over which standing still is judged.
 const STILL_ACTIONS: u32 = 10;
 /// A robot that moved less than this over [`STILL_ACTIONS`], and turned less than
@@ -30,10 +32,10 @@ const RECOVERIES_MAX: u32 = 10;
 /// What the composed policy wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Decision {
-    /// Drive to this point next.
-    Waypoint(Point),
-    /// Drive to this point next; a new plan was just made.
-    Recovering(Point),
+    /// Drive to this point next, at this speed (metres per second).
+    Waypoint(Point, f64),
+    /// The same, just after a new plan was made.
+    Recovering(Point, f64),
     /// The goal is reached.
     Reached,
     /// No plan leads on from here.
@@ -117,7 +119,11 @@ impl ComposedPolicy {
         let command = self.command();
         self.percept.last_command = command;
         let waypoint = command.to_world(&self.percept.state.pose);
-        if recovering { Decision::Recovering(waypoint) } else { Decision::Waypoint(waypoint) }
+        if recovering {
+            Decision::Recovering(waypoint, command.speed_mps)
+        } else {
+            Decision::Waypoint(waypoint, command.speed_mps)
+        }
     }
 
     /// Tells the policy where its last waypoint brought the robot.
@@ -129,7 +135,7 @@ impl ComposedPolicy {
         if leg.is_allowed(&after.pose) {
             self.stray_actions = 0;
         } else {
-            self.stray_actions += 1;
+            self.stray_actions += u32::from(self.tracker.cross_track_m.abs() > OFF_GUIDE_M);
             self.events.strays += 1;
         }
         let (anchor, since) = self.anchor;

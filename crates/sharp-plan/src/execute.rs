@@ -116,9 +116,9 @@ fn run_episode(
         let before_us = clock_us();
         let decision = policy.decide();
         episode.decisions_us.push(clock_us() - before_us);
-        let waypoint = match decision {
-            Decision::Waypoint(waypoint) => waypoint,
-            Decision::Recovering(waypoint) => {
+        let (waypoint, speed_mps) = match decision {
+            Decision::Waypoint(waypoint, speed_mps) => (waypoint, speed_mps),
+            Decision::Recovering(waypoint, speed_mps) => {
                 let reverse_m = plan.workspace.robot.recovery_reverse_m;
                 if episode.contacts > 0 && reverse_m > 0.0 {
                     // Out of contact first: a forward-only robot with its nose at a wall cannot turn.
@@ -127,7 +127,7 @@ fn run_episode(
                     policy.observe(report.after);
                     continue;
                 }
-                waypoint
+                (waypoint, speed_mps)
             }
             Decision::Reached => {
                 episode.end = EpisodeEnd::Reached;
@@ -138,7 +138,7 @@ fn run_episode(
                 break;
             }
         };
-        let report = vehicle.act(waypoint);
+        let report = vehicle.act_at(waypoint, speed_mps);
         episode.time_s += report.time_s;
         episode.path_m += report.path_m;
         episode.trace.push(report.after.pose);

@@ -99,7 +99,7 @@ pub fn read_ron<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
 ///
 /// # Errors
 /// Returns an error that names the file if it cannot be written.
-pub fn write_blob(folder: &Path, bytes: &[u8], ending: &str) -> Result<String, FileError> {
+pub(crate) fn write_blob(folder: &Path, bytes: &[u8], ending: &str) -> Result<String, FileError> {
     let name = format!("{}.{ending}", &hash(bytes)[..32]);
     let path = folder.join(&name);
     if !path.exists() {
@@ -112,7 +112,7 @@ pub fn write_blob(folder: &Path, bytes: &[u8], ending: &str) -> Result<String, F
 ///
 /// # Errors
 /// Returns an error that names the file if it is missing, damaged or not a plain name in `folder`.
-pub fn read_blob(folder: &Path, name: &str) -> Result<Vec<u8>, FileError> {
+pub(crate) fn read_blob(folder: &Path, name: &str) -> Result<Vec<u8>, FileError> {
     let path = folder.join(name);
     let stem = name.split('.').next().unwrap_or("");
     if stem.len() != 32 || !stem.bytes().all(|byte| byte.is_ascii_hexdigit()) || name.contains(['/', '\\']) {

@@ -194,7 +194,9 @@ impl Lesson<'_> {
         Trial { workspace: self.workspace, noise: self.noise, episodes, seed: self.seed.child(purpose, index) }
     }
 
-    fn certify(&self, policy: &OptionPolicy) -> Certificate {
+    /// What `policy` holds on the lesson's fresh episodes.
+    #[must_use]
+    pub fn certify(&self, policy: &OptionPolicy) -> Certificate {
         self.trial(self.settings.certify_episodes, "certify", 0).of_leg(self.leg, policy, &self.starts)
     }
 
@@ -236,8 +238,8 @@ impl Lesson<'_> {
     fn learn_correction(&self, base: Follower, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
         let robot = &self.workspace.robot;
         // A car corrects less: at full lock noise on a good base costs more than it teaches.
-        let (reach, bearing_rad) = if robot.can_turn_in_place() { (0.8, 1.0) } else { (0.4, 0.5) };
-        let correction = Correction { reach_m: reach * robot.waypoint_reach_m, bearing_rad };
+        let (share, bearing_rad) = if robot.can_turn_in_place() { (0.6, 0.8) } else { (0.4, 0.5) };
+        let correction = Correction { speed_mps: share * robot.max_speed_mps, bearing_rad };
         self.learn_sac(Form::Guide { base, correction }, RewardMode::Shaped(ShapedReward::default()), stop)
     }
 

@@ -57,7 +57,7 @@ impl Percept {
     /// The percept of a robot that has not acted yet.
     #[must_use]
     pub const fn first(state: RobotState) -> Self {
-        let last_command = PolarWaypoint { reach_m: 0.0, bearing_rad: 0.0 };
+        let last_command = PolarWaypoint { reach_m: 0.0, bearing_rad: 0.0, speed_mps: 0.0 };
         Self { state, last_displacement: [0.0; 3], last_command }
     }
 
@@ -146,7 +146,7 @@ pub(crate) fn guide_observation(
     put(dx / robot.waypoint_reach_m);
     put(dy / robot.waypoint_reach_m);
     put(turn);
-    put(percept.last_command.reach_m / robot.waypoint_reach_m);
+    put(percept.last_command.speed_mps / robot.max_speed_mps);
     put(percept.last_command.bearing_rad / std::f64::consts::PI);
 }
 

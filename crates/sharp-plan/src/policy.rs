@@ -12,14 +12,34 @@ use sharp_space::{Heading, Point, Pose, Vector};
 
 use crate::percept::{Percept, Tracker, Workspace, absolute_observation, guide_observation};
 
-/// Look-ahead pursuit of a guide path.
+/// How a follower chooses its direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Rule {
+    /// Towards the guide's point this far ahead, metres: robust, but cuts corners.
+    Pursuit {
+        /// How far along the guide the robot looks, metres.
+        look_ahead_m: f64,
+    },
+    /// Along the guide's tangent a little ahead, turned back towards the guide in proportion to the
+    /// distance from it. The guide was certified with the outline along its tangent, so a robot that
+    /// keeps the tangent keeps the certified room.
+    Field {
+        /// How far ahead along the guide the tangent is taken, metres.
+        look_ahead_m: f64,
+        /// Distance from the guide at which the direction is turned by 45 degrees, metres.
+        softness_m: f64,
+    },
+}
+
+/// Follows a guide path at a constant speed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Follower {
-    /// How far along the guide the robot looks, metres.
-    pub look_ahead_m: f64,
-    /// Distance of the waypoint from the robot, metres; with one waypoint each 0.5 s also the speed.
-    pub reach_m: f64,
+    /// Where to.
+    pub rule: Rule,
+    /// How fast, metres per second.
+    pub speed_mps: f64,
 }
 
 /// A waypoint as the robot sees it.
@@ -29,6 +49,8 @@ pub struct PolarWaypoint {
     pub reach_m: f64,
     /// Direction against the robot's heading, radians, left positive.
     pub bearing_rad: f64,
+    /// Speed at which it is approached, metres per second.
+    pub speed_mps: f64,
 }
 
 impl PolarWaypoint {
@@ -39,37 +61,56 @@ impl PolarWaypoint {
         pose.position + heading.unit() * self.reach_m
     }
 
-    /// How a robot at `pose` sees the world point `point`.
+    /// How a robot at `pose` sees the world point `point`, approached at `speed_mps`.
     #[must_use]
-    pub fn of(pose: &Pose, point: Point) -> Self {
+    pub fn of(pose: &Pose, point: Point, speed_mps: f64) -> Self {
         let local = pose.to_local(point);
-        Self { reach_m: local.norm(), bearing_rad: local.y.atan2(local.x) }
+        Self { reach_m: local.norm(), bearing_rad: local.y.atan2(local.x), speed_mps }
     }
 }
 
 impl Follower {
-    /// The followers worth trying for `robot`, fastest first (see `docs/algorithms/options.md`).
+    /// The followers worth trying for `robot`, fastest first (see `docs/algorithms/planning.md`).
     #[must_use]
     pub fn candidates(robot: &RobotModel) -> Vec<Self> {
-        let fast = robot.waypoint_reach_m;
-        let slow = [1.0, 0.7, 0.5, 0.35].map(|share| share * fast);
-        let look_ahead = if robot.can_turn_in_place() { [0.8, 0.5] } else { [0.8, 0.6] };
-        slow.iter()
-            .flat_map(|&reach_m| look_ahead.map(|look_ahead_m| Self { look_ahead_m, reach_m }))
-            .collect()
+        let rules = [
+            Rule::Pursuit { look_ahead_m: 0.8 },
+            Rule::Pursuit { look_ahead_m: 0.5 },
+            Rule::Field { look_ahead_m: 0.4, softness_m: 0.8 },
+            Rule::Field { look_ahead_m: 0.25, softness_m: 0.5 },
+        ];
+        let speeds = [1.0, 0.7, 0.5, 0.35].map(|share| share * robot.max_speed_mps);
+        speeds.into_iter().flat_map(|speed_mps| rules.map(|rule| Self { rule, speed_mps })).collect()
     }
 
     /// The follower for legs that were never tried: slow, looking near.
     #[must_use]
     pub fn cautious(robot: &RobotModel) -> Self {
-        Self { look_ahead_m: 0.6, reach_m: 0.5 * robot.waypoint_reach_m }
+        Self { rule: Rule::Field { look_ahead_m: 0.3, softness_m: 0.6 }, speed_mps: 0.5 * robot.max_speed_mps }
     }
 
-    /// The next waypoint for a robot that has come `tracker.arc_m` along `view.guide`.
+    /// The next waypoint for a robot at `pose` whose projection onto the guide is `tracker`: always
+    /// as far away as the robot allows, so that noise in the point is little noise in the direction.
     #[must_use]
-    pub fn waypoint(&self, pose: &Pose, arc_m: f64, view: &GuideView<'_>) -> PolarWaypoint {
-        let seen = PolarWaypoint::of(pose, view.ahead(arc_m + self.look_ahead_m).position);
-        PolarWaypoint { reach_m: seen.reach_m.min(self.reach_m), ..seen }
+    pub fn waypoint(
+        &self,
+        robot: &RobotModel,
+        pose: &Pose,
+        tracker: &Tracker,
+        view: &GuideView<'_>,
+    ) -> PolarWaypoint {
+        let bearing_rad = match self.rule {
+            Rule::Pursuit { look_ahead_m } => {
+                let local = pose.to_local(view.ahead(tracker.arc_m + look_ahead_m).position);
+                local.y.atan2(local.x)
+            }
+            Rule::Field { look_ahead_m, softness_m } => {
+                let tangent = view.ahead(tracker.arc_m + look_ahead_m).heading;
+                let back = (tracker.cross_track_m / softness_m).atan();
+                pose.heading.turn_to(Heading::new(tangent.radians() - back))
+            }
+        };
+        PolarWaypoint { reach_m: robot.waypoint_reach_m, bearing_rad, speed_mps: self.speed_mps }
     }
 }
 
@@ -107,8 +148,8 @@ fn extend(pose: Pose, by_m: f64) -> Pose {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Correction {
-    /// Change of the distance at full action, metres.
-    pub reach_m: f64,
+    /// Change of the speed at full action, metres per second.
+    pub speed_mps: f64,
     /// Change of the direction at full action, radians.
     pub bearing_rad: f64,
 }
@@ -162,22 +203,24 @@ impl Form {
         &self,
         robot: &RobotModel,
         pose: &Pose,
-        arc_m: f64,
+        tracker: &Tracker,
         view: &GuideView<'_>,
         action: &[f32],
     ) -> PolarWaypoint {
         let (a, b) = (f64::from(action[0]), f64::from(action[1]));
         match self {
             Self::Guide { base, correction } => {
-                let wanted = base.waypoint(pose, arc_m, view);
-                let least = 0.1 * robot.waypoint_reach_m;
+                let wanted = base.waypoint(robot, pose, tracker, view);
+                let speed_mps = wanted.speed_mps + a * correction.speed_mps;
                 PolarWaypoint {
-                    reach_m: (wanted.reach_m + a * correction.reach_m).clamp(least, robot.waypoint_reach_m),
+                    speed_mps: speed_mps.clamp(0.1 * robot.max_speed_mps, robot.max_speed_mps),
                     bearing_rad: wanted.bearing_rad + b * correction.bearing_rad,
+                    ..wanted
                 }
             }
             Self::Absolute { reach_m } => {
-                let seen = PolarWaypoint::of(pose, pose.position + Vector::new(a, b) * *reach_m);
+                let point = pose.position + Vector::new(a, b) * *reach_m;
+                let seen = PolarWaypoint::of(pose, point, robot.max_speed_mps);
                 PolarWaypoint { reach_m: seen.reach_m.min(robot.waypoint_reach_m), ..seen }
             }
         }
@@ -217,12 +260,14 @@ impl OptionPolicy {
         scratch: &mut DecisionScratch,
     ) -> PolarWaypoint {
         match self {
-            Self::Follower(follower) => follower.waypoint(&percept.state.pose, tracker.arc_m, view),
+            Self::Follower(follower) => {
+                follower.waypoint(&workspace.robot, &percept.state.pose, tracker, view)
+            }
             Self::Learnt { form, actor } => {
                 scratch.observation.resize(form.observation_len(), 0.0);
                 form.observe(workspace, percept, tracker, view, &mut scratch.observation);
                 actor.act_mean(&scratch.observation, &mut scratch.actor, &mut scratch.action);
-                form.waypoint(&workspace.robot, &percept.state.pose, tracker.arc_m, view, &scratch.action)
+                form.waypoint(&workspace.robot, &percept.state.pose, tracker, view, &scratch.action)
             }
         }
     }

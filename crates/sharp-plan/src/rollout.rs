@@ -67,7 +67,7 @@ impl Driver<'_> {
                 break;
             }
             let command = self.policy.decide(workspace, &percept, &tracker, &self.view(), scratch);
-            let report = vehicle.act(command.to_world(&percept.state.pose));
+            let report = vehicle.act_at(command.to_world(&percept.state.pose), command.speed_mps);
             time_s += report.time_s;
             path_m += report.path_m;
             percept = percept.next(command, report.after);

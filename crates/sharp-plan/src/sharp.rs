@@ -37,6 +37,8 @@ pub struct SolveSettings {
     pub repair_episodes: u32,
     /// Rounds of repair; 0 is the paper's rule.
     pub repair_rounds: u32,
+    /// Success wanted of the whole plan; its legs share the failures that are left.
+    pub wanted_success: f64,
     /// Fresh runs through the whole plan that its predicted success is counted on.
     pub verify_episodes: u32,
     /// A leg that holds less often than this in the plan loses its edge.
@@ -57,8 +59,9 @@ impl SolveSettings {
             learn: LearnSettings::new(mode),
             search,
             noise,
-            repair_episodes: 400,
+            repair_episodes: 1000,
             repair_rounds: if mode == LearningMode::Paper { 0 } else { 3 },
+            wanted_success: 0.99,
             verify_episodes: 1000,
             // The paper keeps whatever was learnt.
             usable_success: if mode == LearningMode::Paper { 0.0 } else { 0.9 },
@@ -303,13 +306,20 @@ impl Run<'_> {
     }
 
     /// Runs the plan and trains the weak legs on the states in which they were really entered.
-    /// Returns false if no leg was weak or none became better.
+    /// Returns false if the plan holds as often as wanted, or no leg became better.
     fn repair(&mut self, legs: &[Arc<Leg>], round: u64) -> Result<bool, FileError> {
         let runs = self.run_chain(legs, self.settings.repair_episodes, "repair", round);
+        let wanted = self.settings.wanted_success;
+        if Tally::count(runs.iter().map(|run| run.outcome == LegOutcome::Done)).rate() >= wanted {
+            return Ok(false);
+        }
+        // n legs that each fail at most a share (1 - wanted) / n make a plan that holds as wanted.
+        let leg_wanted = 1.0 - (1.0 - wanted) / legs.len() as f64;
+        let is_weak = |tally: &Tally| tally.episodes >= 50 && tally.rate() < leg_wanted;
         let on_arrival = tallies(&runs, legs.len());
-        let is_weak = |tally: &Tally| tally.episodes >= 50 && tally.rate() < self.settings.learn.wanted_success;
         let weak: Vec<usize> = (0..legs.len()).filter(|&index| is_weak(&on_arrival[index])).collect();
-        let results: Vec<_> = weak.par_iter().map(|&index| self.relearn(&legs[index], index, &runs, round)).collect();
+        let relearn = |&index: &usize| self.relearn(&legs[index], index, &runs, (leg_wanted, round));
+        let results: Vec<_> = weak.par_iter().map(relearn).collect();
         let mut better = false;
         for (index, learnt) in weak.into_iter().zip(results) {
             if let Some(learnt) = learnt {
@@ -322,19 +332,24 @@ impl Run<'_> {
     }
 
     /// A policy for `leg` that holds more often than its present one on what `runs` arrived with.
-    fn relearn(&self, leg: &Arc<Leg>, index: usize, runs: &[ChainRun], round: u64) -> Option<Learnt> {
+    fn relearn(
+        &self,
+        leg: &Arc<Leg>,
+        index: usize,
+        runs: &[ChainRun],
+        (wanted, round): (f64, u64),
+    ) -> Option<Learnt> {
         let arrivals: Vec<RobotState> = runs.iter().filter_map(|run| run.entries.get(index).copied()).collect();
         let seed = self.settings.seed.child(&format!("repair {}", leg.id), round);
         let starts = self.starts(leg, seed).with_arrivals(arrivals);
-        let lesson = self.lesson(leg, starts, seed);
+        let settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
+        let lesson = Lesson { settings: &settings, ..self.lesson(leg, starts, seed) };
         let old = &self.learnt[&leg.id];
-        let episodes = self.settings.learn.certify_episodes;
-        let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes, seed };
-        let present = trial.of_leg(leg, &old.policy, &lesson.starts).tally;
+        let present = lesson.certify(&old.policy);
         let mut new = lesson.learn(&|| self.monitor.should_stop()).ok()?;
         new.env_steps += old.env_steps;
         new.gradient_steps += old.gradient_steps;
-        (new.verified.successes > present.successes).then_some(new)
+        (new.verified.successes > present.tally.successes).then_some(new)
     }
 
     fn solution(&self, legs: &[Arc<Leg>], runs: &[ChainRun], on_arrival: &[Tally]) -> Solution {
@@ -371,9 +386,11 @@ impl Run<'_> {
 
 /// Stands for a policy that never succeeds.
 fn useless() -> Learnt {
-    let follower = crate::policy::Follower { look_ahead_m: 0.5, reach_m: 0.2 };
     let verified = Tally { episodes: 1, successes: 0 };
-    let policy = crate::policy::OptionPolicy::Follower(follower);
+    let policy = crate::policy::OptionPolicy::Follower(crate::policy::Follower {
+        rule: crate::policy::Rule::Pursuit { look_ahead_m: 0.5 },
+        speed_mps: 0.2,
+    });
     Learnt { policy, verified, mean_time_s: f64::INFINITY, env_steps: 0, gradient_steps: 0 }
 }
 

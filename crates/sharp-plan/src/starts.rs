@@ -102,7 +102,7 @@ struct ViabilityProbe<'a> {
 
 impl<'a> ViabilityProbe<'a> {
     fn new(workspace: &'a Workspace, leg: &'a Leg, seed: Seed) -> Self {
-        let slow = Follower { look_ahead_m: 0.5, reach_m: 0.4 * workspace.robot.waypoint_reach_m };
+        let slow = Follower::cautious(&workspace.robot);
         let vehicle = crate::learn::kinematic_vehicle(workspace, &NoiseModel::none(), true);
         Self { workspace, leg, policy: OptionPolicy::Follower(slow), vehicle, seed, scratch: DecisionScratch::default() }
     }

@@ -80,8 +80,8 @@ impl Environment for LegTask {
         let percept = self.percept.expect("reset comes before step");
         let pose = percept.state.pose;
         let view = GuideView { guide: &self.leg.guide, next: None };
-        let command = self.form.waypoint(&self.workspace.robot, &pose, self.tracker.arc_m, &view, action);
-        let report = self.vehicle.act(command.to_world(&pose));
+        let command = self.form.waypoint(&self.workspace.robot, &pose, &self.tracker, &view, action);
+        let report = self.vehicle.act_at(command.to_world(&pose), command.speed_mps);
         let percept = percept.next(command, report.after);
         let before = self.tracker;
         self.tracker.update(&self.leg.guide, &percept.state.pose);

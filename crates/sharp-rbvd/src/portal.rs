@@ -1,8 +1,11 @@
 //! Where two cells of the diagram meet, and whether a robot passes there.
 //!
 //! The paper's neighbourhood V asks only for a common border. Two rooms may share two doors, and a
-//! border may be too narrow for the robot, so each connected piece of a border that is wide enough
-//! is a [`Portal`], and neighbours are states with a portal between them.
+//! border may be too narrow for the robot, so each piece of a border that is wide enough is a
+//! [`Portal`], and neighbours are states with a portal between them. A border that runs from a
+//! corridor through a doorway into a room is connected, but its roomiest point may lie in the room,
+//! where nobody who follows the corridor goes: pieces also end where the border narrows and widens
+//! again.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +21,11 @@ use crate::space::{FreeSpace, NONE};
 #[serde(transparent)]
 pub struct PortalId(pub u32);
 
-/// One connected piece of the border between two cells of the diagram.
+/// How much the border must narrow between two places for them to be portals of their own, metres:
+/// more than the rounding of distances to cells.
+const PROMINENCE_M: f64 = 0.1;
+
+/// One piece of the border between two cells of the diagram.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Portal {
     /// Its name.
@@ -80,31 +87,48 @@ pub(crate) fn find_portals(
     // 1 µm forgives the rounding of single-precision distances.
     let least_m = min_width_m - 1e-6;
     let borders = crossings.chunk_by(|a, b| a.between == b.between);
-    let pieces = borders.flat_map(|border| connected_pieces(space, border));
+    let pieces = borders.flat_map(|border| pieces(space, clearance, border));
     let portals = pieces.map(|piece| portal(space, clearance, &piece, reach_m));
     let wide = portals.filter(|portal| portal.width_m >= least_m);
     wide.zip(0..).map(|(portal, id)| Portal { id: PortalId(id), ..portal }).collect()
 }
 
-/// Splits the border of two states into pieces along which one can move from cell to cell.
-fn connected_pieces(space: &FreeSpace, border: &[Crossing]) -> Vec<Vec<Crossing>> {
+/// Splits the border of two states into pieces that each widen towards one roomiest place.
+///
+/// The cells are flooded from the roomiest down; two pools that meet become one unless the shallower
+/// of them is more than [`PROMINENCE_M`] roomier than the place where they meet.
+fn pieces(space: &FreeSpace, clearance: &DistanceField, border: &[Crossing]) -> Vec<Vec<Crossing>> {
     let mut cells: Vec<usize> = border.iter().flat_map(|c| [c.cells.0, c.cells.1]).collect();
     cells.sort_unstable();
     cells.dedup();
-    let mut pieces = UnionFind::new(cells.len());
-    for (vertex, &cell) in cells.iter().enumerate() {
-        for (other, _) in space.moves(cell) {
-            if let Ok(other) = cells.binary_search(&other) {
-                pieces.union(vertex, other);
+    let room = |vertex: usize| clearance.at(space.frame.cell(cells[vertex]));
+    let mut order: Vec<usize> = (0..cells.len()).collect();
+    order.sort_by(|&a, &b| room(b).total_cmp(&room(a)).then(a.cmp(&b)));
+
+    let mut pools = UnionFind::new(cells.len());
+    let mut peak: Vec<Option<f64>> = vec![None; cells.len()];
+    for &vertex in &order {
+        peak[vertex] = Some(room(vertex));
+        let next = space.moves(cells[vertex]).filter_map(|(other, _)| cells.binary_search(&other).ok());
+        let flooded = next.filter(|&other| peak[other].is_some());
+        let mut near: Vec<_> = flooded.map(|other| (peak[pools.find(other)].unwrap_or(0.0), other)).collect();
+        // The deepest pool first: it takes the cell, and shallow ones join it.
+        near.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        for (index, &(_, other)) in near.iter().enumerate() {
+            let pool = peak[pools.find(other)].expect("a flooded cell has a pool");
+            let own = peak[pools.find(vertex)].expect("this cell is flooded");
+            if index == 0 || pool.min(own) - room(vertex) <= PROMINENCE_M {
+                pools.union(vertex, other);
+                peak[pools.find(vertex)] = Some(pool.max(own));
             }
         }
     }
-    let mut by_piece: BTreeMap<usize, Vec<Crossing>> = BTreeMap::new();
+    let mut by_pool: BTreeMap<usize, Vec<Crossing>> = BTreeMap::new();
     for &crossing in border {
         let vertex = cells.binary_search(&crossing.cells.0).expect("every border cell is listed");
-        by_piece.entry(pieces.find(vertex)).or_default().push(crossing);
+        by_pool.entry(pools.find(vertex)).or_default().push(crossing);
     }
-    let mut pieces: Vec<_> = by_piece.into_values().collect();
+    let mut pieces: Vec<_> = by_pool.into_values().collect();
     // By first crossing: the order shall not depend on how the sets were merged.
     pieces.sort_unstable();
     pieces

@@ -163,6 +163,28 @@ fn two_doors_between_two_rooms_are_two_portals() {
 }
 
 #[test]
+fn a_border_from_a_corridor_into_a_room_is_two_portals() {
+    // The border runs along the middle row, through the doorway of the room on the left.
+    let drawing = "
+        ################
+        #BBBBBBBBBBBBBB#
+        #..............#
+        #........##....#
+        #........##....#
+        #..............#
+        #..............#
+        #........##....#
+        #........##....#
+        #..............#
+        #AAAAAAAAAAAAAA#
+        ################";
+    let (rbvd, _) = build(drawing, &RbvdSettings { portal_min_width_m: 1.0, ..RbvdSettings::default() });
+    let columns: Vec<f64> = rbvd.portals().iter().map(|portal| portal.point.x.round()).collect();
+    assert_eq!(columns.len(), 2, "one portal in the room, one in the corridor: {columns:?}");
+    assert!(columns.iter().any(|&x| x < 9.0) && columns.iter().any(|&x| x > 11.0), "{columns:?}");
+}
+
+#[test]
 fn narrow_borders_join_no_states() {
     let drawing = "
         .....#.....

@@ -49,15 +49,16 @@ impl WaypointController {
     }
 
     /// Begins an action at `pose`: the waypoint's distance asks for the speed that covers it within
-    /// the action. A waypoint that is not finite asks for a stop.
+    /// the action, up to `speed_max_mps`. A waypoint that is not finite asks for a stop.
     #[must_use]
-    pub fn aim(&self, pose: &Pose, waypoint: Point) -> Aim {
+    pub fn aim(&self, pose: &Pose, waypoint: Point, speed_max_mps: f64) -> Aim {
         let way = waypoint - pose.position;
         let distance_m = way.norm();
         if !distance_m.is_finite() {
             return Aim { waypoint: pose.position, direction: pose.heading.unit(), speed_mps: 0.0 };
         }
-        let speed_mps = (distance_m / self.action_s).clamp(self.min_speed_mps, self.max_speed_mps);
+        let wanted_mps = (distance_m / self.action_s).min(speed_max_mps);
+        let speed_mps = wanted_mps.clamp(self.min_speed_mps, self.max_speed_mps);
         let direction = if distance_m > 1e-6 { way / distance_m } else { pose.heading.unit() };
         Aim { waypoint, direction, speed_mps }
     }

@@ -131,10 +131,17 @@ impl<S: Simulator> Vehicle<S> {
         self.delayed.extend(std::iter::repeat_n(current, periods));
     }
 
-    /// Drives towards `waypoint` for one action. A waypoint that is not finite asks for a stop.
+    /// Drives towards `waypoint` for one action, as fast as its distance asks for.
     pub fn act(&mut self, waypoint: Point) -> ActionReport {
+        self.act_at(waypoint, self.robot.max_speed_mps)
+    }
+
+    /// Drives towards `waypoint` for one action, not faster than `speed_max_mps`: a far waypoint
+    /// approached slowly keeps its direction where a near one would lose it to noise. A waypoint
+    /// that is not finite asks for a stop.
+    pub fn act_at(&mut self, waypoint: Point, speed_max_mps: f64) -> ActionReport {
         let noise = self.begin_action();
-        let aim = self.controller.aim(&self.state().pose, waypoint + noise.waypoint_shift);
+        let aim = self.controller.aim(&self.state().pose, waypoint + noise.waypoint_shift, speed_max_mps);
         let mut report = self.blank_report();
         for _ in 0..self.settings.controls_per_action() {
             let command = self.controller.command(self.sim.state(), &aim);

@@ -4,6 +4,7 @@ pub(crate) mod abstraction;
 pub(crate) mod eval;
 pub(crate) mod library;
 pub(crate) mod map;
+pub(crate) mod regions;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;

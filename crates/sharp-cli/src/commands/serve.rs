@@ -25,6 +25,8 @@ struct Request {
 #[derive(Serialize)]
 struct Reply<'a> {
     waypoint: Option<[f64; 3]>,
+    /// Speed at which the waypoint is to be approached, metres per second.
+    speed: f64,
     option: &'a str,
     status: &'static str,
 }
@@ -95,11 +97,11 @@ fn answer(policy: &mut ComposedPolicy, pose: &Pose) -> String {
         let towards = point - pose.position;
         Some([point.x, point.y, towards.y.atan2(towards.x)])
     };
-    let (waypoint, status) = match decision {
-        Decision::Waypoint(point) => (to(point), "running"),
-        Decision::Recovering(point) => (to(point), "recovering"),
-        Decision::Reached => (None, "reached"),
-        Decision::Lost => (None, "lost"),
+    let (waypoint, speed, status) = match decision {
+        Decision::Waypoint(point, speed) => (to(point), speed, "running"),
+        Decision::Recovering(point, speed) => (to(point), speed, "recovering"),
+        Decision::Reached => (None, 0.0, "reached"),
+        Decision::Lost => (None, 0.0, "lost"),
     };
-    to_json(&Reply { waypoint, option: &option, status })
+    to_json(&Reply { waypoint, speed, option: &option, status })
 }
