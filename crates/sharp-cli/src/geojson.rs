@@ -19,7 +19,8 @@ pub(crate) fn route(abstraction: &Abstraction, speed_mps: f64) -> String {
     }
     let nodes = features.len();
     for (index, spec) in options.options().iter().enumerate() {
-        let (from, to) = (options.endpoint(spec.initiation).center, options.endpoint(spec.termination).center);
+        let (from, to) =
+            (options.endpoint(spec.initiation).center, options.endpoint(spec.termination).center);
         let length_m = (to - from).norm();
         features.push(json!({
             "type": "Feature",

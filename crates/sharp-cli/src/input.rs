@@ -31,7 +31,8 @@ pub(crate) fn robot(name: &str) -> Result<RobotModel, Failure> {
         "limo" => Ok(RobotModel::limo()),
         file => {
             let text = read_text(file, "robot", "husky, limo or a robot file")?;
-            RobotModel::from_ron(&text).map_err(|error| Failure::new("ROBOT_INVALID", format!("{file}: {error}")))
+            RobotModel::from_ron(&text)
+                .map_err(|error| Failure::new("ROBOT_INVALID", format!("{file}: {error}")))
         }
     }
 }
@@ -49,14 +50,18 @@ pub(crate) fn noise(name: &str) -> Result<NoiseModel, Failure> {
 pub(crate) fn read_text(file: &str, what: &str, expected: &str) -> Result<String, Failure> {
     let metadata = fs::metadata(file).ok().filter(fs::Metadata::is_file);
     if metadata.is_none_or(|metadata| metadata.len() > 1 << 20) {
-        return Err(Failure::new("FILE_UNREADABLE", format!("{what} {file:?} is not a file of at most 1 MiB, expected {expected}")));
+        return Err(Failure::new(
+            "FILE_UNREADABLE",
+            format!("{what} {file:?} is not a file of at most 1 MiB, expected {expected}"),
+        ));
     }
     fs::read_to_string(file).map_err(|error| Failure::new("FILE_UNREADABLE", format!("{file}: {error}")))
 }
 
 /// A pose typed as `X,Y,YAW`.
 pub(crate) fn pose(flag: &str, text: &str) -> Result<Pose, Failure> {
-    let broken = || Failure::new("POSE_INVALID", format!("{flag} is {text:?}, expected three finite numbers X,Y,YAW"));
+    let broken =
+        || Failure::new("POSE_INVALID", format!("{flag} is {text:?}, expected three finite numbers X,Y,YAW"));
     let numbers: Vec<f64> =
         text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().map_err(|_| broken())?;
     let [x, y, yaw] = <[f64; 3]>::try_from(numbers).map_err(|_| broken())?;
@@ -83,7 +88,8 @@ fn check_end(
     heading_counts: bool,
 ) -> Result<(), Failure> {
     let frame = workspace.grid.frame();
-    let at = format!("{name} ({:.2}, {:.2}, {:.2})", pose.position.x, pose.position.y, pose.heading.radians());
+    let at =
+        format!("{name} ({:.2}, {:.2}, {:.2})", pose.position.x, pose.position.y, pose.heading.radians());
     let Some(cell) = frame.cell_at(pose.position) else {
         let bounds = frame.bounds();
         return Err(Failure::new(
@@ -105,11 +111,12 @@ fn check_end(
     }
     let what = match workspace.grid.get(cell) {
         sharp_space::Occupancy::Occupied => "lies in an obstacle".to_owned(),
-        sharp_space::Occupancy::Unknown => "lies in unknown space (--unknown free takes it as free)".to_owned(),
-        sharp_space::Occupancy::Free => format!(
-            "is too near to an obstacle for the {}: its footprint overlaps",
-            workspace.robot.name
-        ),
+        sharp_space::Occupancy::Unknown => {
+            "lies in unknown space (--unknown free takes it as free)".to_owned()
+        }
+        sharp_space::Occupancy::Free => {
+            format!("is too near to an obstacle for the {}: its footprint overlaps", workspace.robot.name)
+        }
     };
     Err(Failure::new(occupied, format!("{at} {what}; {}", nearest_hint(workspace, pose))))
 }
@@ -124,7 +131,12 @@ fn nearest_hint(workspace: &Workspace, pose: &Pose) -> String {
     match fits.min_by(|&a, &b| distance(a).total_cmp(&distance(b))) {
         Some(cell) => {
             let point = frame.center(cell);
-            format!("the nearest place with room is ({:.2}, {:.2}), {:.2} m away", point.x, point.y, distance(cell))
+            format!(
+                "the nearest place with room is ({:.2}, {:.2}), {:.2} m away",
+                point.x,
+                point.y,
+                distance(cell)
+            )
         }
         None => "the map has no place with room for it".to_owned(),
     }
@@ -145,7 +157,11 @@ pub(crate) fn query(
     };
     let count = map.problems.len();
     let problem = number.checked_sub(1).and_then(|index| map.problems.get(index)).ok_or_else(|| {
-        let expected = if count == 0 { "this map has no problems of its own".to_owned() } else { format!("expected 1..{count}") };
+        let expected = if count == 0 {
+            "this map has no problems of its own".to_owned()
+        } else {
+            format!("expected 1..{count}")
+        };
         Failure::new("PROBLEM_UNKNOWN", format!("--problem is {number}, {expected}"))
     })?;
     Ok(Query { start: problem.start, goal: problem.goal })

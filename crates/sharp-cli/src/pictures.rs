@@ -35,7 +35,8 @@ pub(crate) fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> St
     let (rbvd, options) = (&abstraction.rbvd, &abstraction.options);
     let regions = regions_of(rbvd);
     let frame = grid.frame();
-    let labels: Vec<(u32, Point)> = rbvd.states().zip(&regions).map(|(state, region)| (state.0, region.center(frame))).collect();
+    let labels: Vec<(u32, Point)> =
+        rbvd.states().zip(&regions).map(|(state, region)| (state.0, region.center(frame))).collect();
     let centers: Vec<Point> = options.endpoints().iter().map(|endpoint| endpoint.center).collect();
     let radius_m = options.endpoints().first().map_or(0.3, |endpoint| endpoint.radius_m);
     let arrows: Vec<(Point, Point)> = options

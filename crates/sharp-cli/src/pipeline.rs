@@ -109,7 +109,9 @@ fn regions_from_file(workspace: &Workspace, file: &str) -> Result<Vec<Region>, F
     let mut regions = Vec::with_capacity(centers.len());
     for (index, &(x, y)) in centers.iter().enumerate() {
         let cell = frame.cell_at(sharp_space::Point::new(x, y)).filter(|&cell| field.at(cell) >= least_m);
-        let cell = cell.ok_or_else(|| broken(format!("entry {index} is ({x}, {y}), expected a place with room for the robot")))?;
+        let cell = cell.ok_or_else(|| {
+            broken(format!("entry {index} is ({x}, {y}), expected a place with room for the robot"))
+        })?;
         let around: Vec<Cell> = std::iter::once(cell)
             .chain(frame.neighbors8(cell).filter(|&cell| field.at(cell) >= least_m))
             .collect();
@@ -129,8 +131,9 @@ fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<
     if metric == Metric::Paper {
         settings.metric = CellMetric::Euclidean;
     }
-    Rbvd::build(workspace.checker.field(), regions, &settings)
-        .map_err(|error| Failure::new("NO_FREE_SPACE", format!("map has no room for the {}: {error}", workspace.robot.name)))
+    Rbvd::build(workspace.checker.field(), regions, &settings).map_err(|error| {
+        Failure::new("NO_FREE_SPACE", format!("map has no room for the {}: {error}", workspace.robot.name))
+    })
 }
 
 /// The library for `choice` ("none", a folder, or by default a cache folder), opened for this world.
@@ -150,11 +153,8 @@ pub(crate) fn library(
 
 /// Options learnt in one world say nothing about another: the key names map, robot, noise, mode and format.
 fn library_key(workspace: &Workspace, noise: &NoiseModel, learning: Learning) -> String {
-    let world = format!(
-        "{} {:?} {noise:?} {learning:?} {FORMAT}",
-        map_hash(&workspace.grid),
-        workspace.robot
-    );
+    let world =
+        format!("{} {:?} {noise:?} {learning:?} {FORMAT}", map_hash(&workspace.grid), workspace.robot);
     format!("{}-{}", workspace.robot.name, &hash(world.as_bytes())[..16])
 }
 

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use sharp_plan::{Leg, Learnt, Monitor, Phase};
+use sharp_plan::{Learnt, Leg, Monitor, Phase};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -88,7 +88,12 @@ pub(crate) struct SolveMonitor {
 impl SolveMonitor {
     pub(crate) fn new(stopwatch: Stopwatch, time_limit: Option<Duration>) -> Self {
         let deadline = time_limit.and_then(|limit| stopwatch.begun.checked_add(limit));
-        Self { stopwatch: Mutex::new(stopwatch), spinner: spinner("searching"), learnt: AtomicUsize::new(0), deadline }
+        Self {
+            stopwatch: Mutex::new(stopwatch),
+            spinner: spinner("searching"),
+            learnt: AtomicUsize::new(0),
+            deadline,
+        }
     }
 
     fn watch(&self) -> MutexGuard<'_, Stopwatch> {

@@ -195,13 +195,20 @@ impl RunReport {
         let tally = sharp_plan::success(episodes);
         let count = |end: EpisodeEnd| episodes.iter().filter(|episode| episode.end == end).count() as u32;
         let sum = |of: fn(&Episode) -> u32| episodes.iter().map(of).sum();
-        let reached: Vec<&Episode> = episodes.iter().filter(|episode| episode.end == EpisodeEnd::Reached).collect();
+        let reached: Vec<&Episode> =
+            episodes.iter().filter(|episode| episode.end == EpisodeEnd::Reached).collect();
         let mean = |of: fn(&Episode) -> f64| {
             reached.iter().map(|episode| of(episode)).sum::<f64>() / reached.len().max(1) as f64
         };
-        let mut decisions: Vec<f64> = episodes.iter().flat_map(|episode| episode.decisions_us.iter().copied()).collect();
+        let mut decisions: Vec<f64> =
+            episodes.iter().flat_map(|episode| episode.decisions_us.iter().copied()).collect();
         decisions.sort_by(f64::total_cmp);
-        let quantile = |q: f64| decisions.get(((decisions.len() as f64 * q) as usize).min(decisions.len().saturating_sub(1))).copied().unwrap_or(0.0);
+        let quantile = |q: f64| {
+            decisions
+                .get(((decisions.len() as f64 * q) as usize).min(decisions.len().saturating_sub(1)))
+                .copied()
+                .unwrap_or(0.0)
+        };
         Self {
             schema: "sharp.run/1",
             episodes: tally.episodes,
@@ -236,4 +243,3 @@ pub(crate) struct AbstractReport {
     pub(crate) components: usize,
     pub(crate) time_s: SolveTimes,
 }
-

@@ -63,7 +63,11 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
         (&["solve", "rooms.yaml", "--start", "0.3,3,1.57", "--goal", "10,3,0"], "START_OCCUPIED", "nearest"),
         (&["solve", "lost.yaml", "--start", "1,1,0", "--goal", "2,2,0"], "", "gone.pgm"),
         (&["solve", "nowhere.yaml", "--start", "1,1,0", "--goal", "2,2,0"], "", "nowhere.yaml"),
-        (&["solve", "full.pgm", "--resolution", "0.1", "--start", "1,1,0", "--goal", "2,2,0"], "START_OCCUPIED", "start"),
+        (
+            &["solve", "full.pgm", "--resolution", "0.1", "--start", "1,1,0", "--goal", "2,2,0"],
+            "START_OCCUPIED",
+            "start",
+        ),
         (&["solve", "a", "--problem", "9"], "PROBLEM_UNKNOWN", "1..5"),
         (&["map", "check", "rooms.yaml", "--robot", "robot.ron"], "ROBOT_INVALID", "robot.ron"),
         (&["run", "missing"], "", "missing"),
@@ -135,7 +139,8 @@ fn a_library_is_reused_and_a_damaged_one_is_named() {
 
     let world = fs::read_dir(folder.path().join("lib")).unwrap().next().unwrap().unwrap().path();
     let option = fs::read_dir(&world).unwrap().map(|entry| entry.unwrap().path());
-    let Some(option) = option.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with("c_"))
+    let Some(option) =
+        option.into_iter().find(|path| path.file_name().unwrap().to_string_lossy().starts_with("c_"))
     else {
         assert_eq!(second["reuse"]["uses"], 0, "a plan with options leaves them in the library");
         return;
@@ -165,8 +170,10 @@ fn serve_answers_every_line() {
     let lines = "{\"pose\":[2.0,3.0,0.0]}\nnonsense\n{\"pose\":[2.2,3.0,0.0]}\n{\"pose\":[10.0,3.5,0.0]}\n";
     child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
     let output = child.wait_with_output().unwrap();
-    let replies: Vec<Value> =
-        String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let replies: Vec<Value> = String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
     assert_eq!(replies.len(), 4, "{replies:?}");
     assert_eq!(replies[0]["status"], "running");
     assert!(replies[0]["waypoint"][0].as_f64() > Some(2.0), "ahead: {}", replies[0]);

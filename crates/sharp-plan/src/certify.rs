@@ -4,8 +4,8 @@ use rayon::prelude::*;
 use sharp_sim::{NoiseModel, RobotState, Simulator, Vehicle};
 use sharp_space::Seed;
 
-use crate::leg::Leg;
 use crate::learn::kinematic_vehicle;
+use crate::leg::Leg;
 use crate::percept::{Percept, Workspace};
 use crate::policy::{DecisionScratch, OptionPolicy};
 use crate::rollout::{ChainRun, Driver, LegOutcome, drive_chain};
@@ -40,12 +40,13 @@ impl Trial<'_> {
     pub fn of_leg(&self, leg: &Leg, policy: &OptionPolicy, starts: &Starts) -> Certificate {
         let horizon = leg.horizon_actions(crate::SLOWEST_REACH_M);
         let driver = Driver { leg, policy, next: None };
-        let ends = self.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
-            let state = starts.draw(&mut self.seed.stream("trial start", episode));
-            vehicle.reset(state, self.seed, episode);
-            let end = driver.drive(self.workspace, vehicle, Percept::first(state), horizon, scratch);
-            (end.outcome == LegOutcome::Done, end.time_s)
-        });
+        let ends =
+            self.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
+                let state = starts.draw(&mut self.seed.stream("trial start", episode));
+                vehicle.reset(state, self.seed, episode);
+                let end = driver.drive(self.workspace, vehicle, Percept::first(state), horizon, scratch);
+                (end.outcome == LegOutcome::Done, end.time_s)
+            });
         certificate(&ends)
     }
 

@@ -1,6 +1,6 @@
 //! The composed policy Π: an automaton whose state is the option that is running.
 //!
-//! Π(x) = π_i(x) in controller state q_i, and q_i → q_{i+1} as soon as x ∈ I_{o_{i+1}}. The paper's
+//! `Π(x) = π_i(x)` in controller state `q_i`, and `q_i → q_{i+1}` as soon as `x ∈ I_{o_{i+1}}`. The paper's
 //! automaton ends there. With recovery, a robot that strays, stands still or takes too long is
 //! placed again by α(x), and a new plan leads on from where it is with the policies at hand.
 
@@ -144,7 +144,7 @@ impl ComposedPolicy {
         self.anchor = if moved { (after, 0) } else { (anchor, since + 1) };
     }
 
-    /// q_i → q_{i+1} while the robot is in the next initiation set; false at the goal.
+    /// `q_i → q_{i+1}` while the robot is in the next initiation set; false at the goal.
     fn advance(&mut self) -> bool {
         while self.legs[self.current].0.is_done(&self.percept.state.pose) {
             if self.current + 1 == self.legs.len() {
@@ -195,7 +195,8 @@ impl ComposedPolicy {
             .collect();
         let guides = known.iter().map(|(&id, planned)| (id, planned.leg.guide.clone()));
         let seed = plan.seed.child("recovery", u64::from(self.events.recoveries));
-        let Ok(mut planner) = Planner::new(&plan.workspace, &plan.abstraction, settings, query, guides, seed) else {
+        let Ok(mut planner) = Planner::new(&plan.workspace, &plan.abstraction, settings, query, guides, seed)
+        else {
             return false;
         };
         let cost = |id: LegId| known.get(&id).map(|planned| planned.learnt.cost_s());

@@ -77,7 +77,8 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 /// Returns an error that names the file if it cannot be written.
 pub fn write_ron<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
     let config = ron::ser::PrettyConfig::new().depth_limit(3).compact_arrays(true).new_line("\n");
-    let text = ron::ser::to_string_pretty(value, config).map_err(|error| FileError::content(path, error))? + "\n";
+    let text =
+        ron::ser::to_string_pretty(value, config).map_err(|error| FileError::content(path, error))? + "\n";
     write_atomic(path, format!("{PREFIX}{}\n{text}", hash(text.as_bytes())).as_bytes())
 }
 

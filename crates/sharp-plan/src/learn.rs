@@ -129,7 +129,14 @@ impl RewardMode {
     /// The reward of an action that moved the robot to `pose` and its projection from `trackers.0`
     /// to `trackers.1`.
     #[must_use]
-    pub fn of(&self, leg: &Leg, pose: &Pose, trackers: (&Tracker, &Tracker), contact: bool, success: bool) -> f64 {
+    pub fn of(
+        &self,
+        leg: &Leg,
+        pose: &Pose,
+        trackers: (&Tracker, &Tracker),
+        contact: bool,
+        success: bool,
+    ) -> f64 {
         let stray = !leg.is_allowed(pose);
         match self {
             Self::Paper(reward) => {
@@ -191,7 +198,12 @@ impl Lesson<'_> {
     }
 
     fn trial(&self, episodes: u32, purpose: &str, index: u64) -> Trial<'_> {
-        Trial { workspace: self.workspace, noise: self.noise, episodes, seed: self.seed.child(purpose, index) }
+        Trial {
+            workspace: self.workspace,
+            noise: self.noise,
+            episodes,
+            seed: self.seed.child(purpose, index),
+        }
     }
 
     /// What `policy` holds on the lesson's fresh episodes.
@@ -231,11 +243,17 @@ impl Lesson<'_> {
         let trial = self.trial(self.settings.screening_episodes, "screen", 0);
         Follower::candidates(&self.workspace.robot)
             .into_iter()
-            .map(|follower| (follower, trial.of_leg(self.leg, &OptionPolicy::Follower(follower), &self.starts)))
+            .map(|follower| {
+                (follower, trial.of_leg(self.leg, &OptionPolicy::Follower(follower), &self.starts))
+            })
             .collect()
     }
 
-    fn learn_correction(&self, base: Follower, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+    fn learn_correction(
+        &self,
+        base: Follower,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Learnt, LearnFailure> {
         let robot = &self.workspace.robot;
         // A car corrects less: at full lock noise on a good base costs more than it teaches.
         let (share, bearing_rad) = if robot.can_turn_in_place() { (0.6, 0.8) } else { (0.4, 0.5) };
@@ -264,7 +282,8 @@ impl Lesson<'_> {
             if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let mut rng = self.seed.stream("sac", 0);
-        let trained = train(&mut tasks, &self.settings.train, &mut rng, &mut observer).map_err(LearnFailure::Broken)?;
+        let trained =
+            train(&mut tasks, &self.settings.train, &mut rng, &mut observer).map_err(LearnFailure::Broken)?;
         if stop() {
             return Err(LearnFailure::Stopped);
         }

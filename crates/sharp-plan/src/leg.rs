@@ -1,4 +1,4 @@
-//! Legs of a plan: an option, or the special cases π_0 and π_{n+1} at either end.
+//! Legs of a plan: an option, or the special cases `π_0` and `π_{n+1}` at either end.
 
 use std::fmt;
 use std::sync::Arc;
@@ -13,11 +13,11 @@ use sharp_space::{Point, Pose};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// π_0: from the initial configuration to the first option, or straight to the goal.
+    /// `π_0`: from the initial configuration to the first option, or straight to the goal.
     First,
-    /// One of o_1 … o_n.
+    /// One of `o_1 … o_n`.
     Option,
-    /// π_{n+1}: from the last option to the goal configuration.
+    /// `π_{n+1}`: from the last option to the goal configuration.
     Last,
 }
 
@@ -164,7 +164,9 @@ impl Leg {
 pub(crate) fn endpoints(options: &OptionSet, id: LegId) -> (Option<EndpointId>, Option<EndpointId>) {
     match id {
         LegId::First(endpoint) => (None, Some(EndpointId(endpoint))),
-        LegId::Option(id) => options.get(id).map_or((None, None), |s| (Some(s.initiation), Some(s.termination))),
+        LegId::Option(id) => {
+            options.get(id).map_or((None, None), |s| (Some(s.initiation), Some(s.termination)))
+        }
         LegId::Last(endpoint, _) => (Some(EndpointId(endpoint)), None),
         LegId::Direct => (None, None),
     }

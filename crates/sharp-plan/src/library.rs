@@ -51,7 +51,8 @@ impl PolicyFile {
             Self::Learnt { form, weights } => {
                 let bytes = files::read_blob(folder, weights)?;
                 let path = folder.join(weights);
-                let (actor, _) = Actor::from_bytes(&bytes).map_err(|error| FileError::content(&path, error))?;
+                let (actor, _) =
+                    Actor::from_bytes(&bytes).map_err(|error| FileError::content(&path, error))?;
                 let spec = actor.spec();
                 if spec.observation_len != form.observation_len() || spec.action_len != 2 {
                     return Err(FileError::content(&path, "the network does not fit the policy's form"));
@@ -108,7 +109,10 @@ impl OptionLibrary {
         for path in option_files(&folder)? {
             let file: OptionFile = files::read_ron(&path)?;
             if file.format != FORMAT {
-                return Err(FileError::content(&path, format!("format is {}, expected {FORMAT}", file.format)));
+                return Err(FileError::content(
+                    &path,
+                    format!("format is {}, expected {FORMAT}", file.format),
+                ));
             }
             if path.file_name() != Some(file_name(file.id).as_ref()) {
                 return Err(FileError::content(&path, format!("holds the option {}", file.id)));

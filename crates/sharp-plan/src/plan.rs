@@ -81,7 +81,8 @@ impl AbstractionFile {
 #[must_use]
 pub fn map_hash(grid: &OccupancyGrid) -> String {
     let frame = grid.frame();
-    let mut bytes = format!("{}x{} {:?} {:?}\n", frame.width, frame.height, frame.resolution_m, frame.origin).into_bytes();
+    let mut bytes = format!("{}x{} {:?} {:?}\n", frame.width, frame.height, frame.resolution_m, frame.origin)
+        .into_bytes();
     bytes.extend(grid.cells().iter().map(|&cell| cell as u8));
     files::hash(&bytes)
 }
@@ -142,7 +143,8 @@ impl Plan {
     /// Returns an error that names the file that could not be written.
     pub fn save(&self, folder: &Path, abstraction: &AbstractionFile) -> Result<(), FileError> {
         abstraction.save(&folder.join(ABSTRACTION_FILE))?;
-        let legs = self.solution.legs.iter().map(|planned| leg_file(planned, folder)).collect::<Result<_, _>>()?;
+        let legs =
+            self.solution.legs.iter().map(|planned| leg_file(planned, folder)).collect::<Result<_, _>>()?;
         let file = PlanFile {
             format: FORMAT,
             map: map_hash(&self.workspace.grid),

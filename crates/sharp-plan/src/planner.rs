@@ -59,9 +59,9 @@ impl SearchSettings {
 /// Where a plan begins and ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Query {
-    /// The initial configuration x_i.
+    /// The initial configuration `x_i`.
     pub start: Pose,
-    /// The goal configuration x_g.
+    /// The goal configuration `x_g`.
     pub goal: Pose,
 }
 
@@ -102,7 +102,12 @@ impl<'a> Planner<'a> {
     ) -> Result<Self, Unplaced> {
         let start = state_near(&abstraction.rbvd, query.start.position).ok_or(Unplaced::Start)?;
         let goal = state_near(&abstraction.rbvd, query.goal.position).ok_or(Unplaced::Goal)?;
-        let graph = OptionGraph::new(&abstraction.rbvd, &abstraction.options, (query.start, start), (query.goal, goal));
+        let graph = OptionGraph::new(
+            &abstraction.rbvd,
+            &abstraction.options,
+            (query.start, start),
+            (query.goal, goal),
+        );
         let guided = BTreeMap::new();
         let mut this =
             Self { workspace, abstraction, settings, query, graph, guided, banned: BTreeSet::new(), seed };
@@ -130,7 +135,8 @@ impl<'a> Planner<'a> {
             let top_speed = self.workspace.robot.max_speed_mps;
             let cost = |leg: &Candidate| self.cost(leg, measured(leg.id));
             let (_, ids) = self.graph.search(top_speed, cost, |before, after| self.join(before, after))?;
-            let missing: Vec<LegId> = ids.iter().copied().filter(|id| !self.guided.contains_key(id)).collect();
+            let missing: Vec<LegId> =
+                ids.iter().copied().filter(|id| !self.guided.contains_key(id)).collect();
             if missing.is_empty() {
                 return ids.iter().map(|id| self.guided[id].clone().ok()).collect();
             }
@@ -162,7 +168,8 @@ impl<'a> Planner<'a> {
 
     /// Seconds lost where one guide ends and the next begins; infinite where the robot cannot turn so.
     fn join(&self, before: &Candidate, after: &Candidate) -> f64 {
-        let (Some(Ok(first)), Some(Ok(second))) = (self.guided.get(&before.id), self.guided.get(&after.id)) else {
+        let (Some(Ok(first)), Some(Ok(second))) = (self.guided.get(&before.id), self.guided.get(&after.id))
+        else {
             return 0.0;
         };
         let turn = first.guide.end().heading.turn_to(second.guide.start().heading).abs();
@@ -194,12 +201,17 @@ impl<'a> Planner<'a> {
         };
         let start_heading = match id {
             LegId::First(_) | LegId::Direct => Some(self.query.start.heading),
-            LegId::Option(option) => source.and_then(|end| approach(end, option.through().unwrap_or(option.to()))),
+            LegId::Option(option) => {
+                source.and_then(|end| approach(end, option.through().unwrap_or(option.to())))
+            }
             LegId::Last(_, state) => source.and_then(|end| approach(end, state)),
         };
         let request = GuideRequest {
             start: GuideEnd { position: candidate.start, heading: start_heading },
-            goal: GuideEnd { position: candidate.end, heading: target.and_then(|end| approach(end, candidate.to)) },
+            goal: GuideEnd {
+                position: candidate.end,
+                heading: target.and_then(|end| approach(end, candidate.to)),
+            },
             allowed: &allowed,
         };
         let mut rng = self.seed.stream(&format!("guide {id}"), 0);

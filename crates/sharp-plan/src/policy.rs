@@ -86,7 +86,10 @@ impl Follower {
     /// The follower for legs that were never tried: slow, looking near.
     #[must_use]
     pub fn cautious(robot: &RobotModel) -> Self {
-        Self { rule: Rule::Field { look_ahead_m: 0.3, softness_m: 0.6 }, speed_mps: 0.5 * robot.max_speed_mps }
+        Self {
+            rule: Rule::Field { look_ahead_m: 0.3, softness_m: 0.6 },
+            speed_mps: 0.5 * robot.max_speed_mps,
+        }
     }
 
     /// The next waypoint for a robot at `pose` whose projection onto the guide is `tracker`: always
@@ -227,7 +230,7 @@ impl Form {
     }
 }
 
-/// The policy π_o of an option.
+/// The policy `π_o` of an option.
 #[derive(Clone, Debug)]
 pub enum OptionPolicy {
     /// A certified follower.

@@ -97,11 +97,12 @@ impl ChainRun {
     /// Returns true if leg number `index` was begun and ended in its termination set.
     #[must_use]
     pub fn passed(&self, index: usize) -> bool {
-        index + 1 < self.entries.len() || (index + 1 == self.entries.len() && self.outcome == LegOutcome::Done)
+        index + 1 < self.entries.len()
+            || (index + 1 == self.entries.len() && self.outcome == LegOutcome::Done)
     }
 }
 
-/// Drives `drivers` one after the other from `start`: the automaton q_i → q_{i+1} without recovery.
+/// Drives `drivers` one after the other from `start`: the automaton `q_i → q_{i+1}` without recovery.
 pub fn drive_chain<S: Simulator>(
     workspace: &Workspace,
     vehicle: &mut Vehicle<S>,

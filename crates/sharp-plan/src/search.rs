@@ -137,7 +137,10 @@ impl OptionGraph {
         use petgraph::visit::EdgeRef;
         let found = astar(&self.graph, self.root, is_goal, |e| edge_cost(e.source(), e.target()), heuristic);
         let (seconds, nodes) = found.filter(|(seconds, _)| seconds.is_finite())?;
-        Some((seconds, nodes.iter().filter_map(|&node| self.graph[node].as_ref().map(|leg| leg.id)).collect()))
+        Some((
+            seconds,
+            nodes.iter().filter_map(|&node| self.graph[node].as_ref().map(|leg| leg.id)).collect(),
+        ))
     }
 }
 
@@ -168,9 +171,14 @@ fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
     }
 }
 
-/// π_0: from the start to each endpoint of its own state, and to the centroids next door, so that
+/// `π_0`: from the start to each endpoint of its own state, and to the centroids next door, so that
 /// nobody has to drive back to a centroid first; straight to the goal if it lies in the same state.
-fn first_legs(rbvd: &Rbvd, options: &OptionSet, start: (Pose, StateId), goal: (Pose, StateId)) -> Vec<Candidate> {
+fn first_legs(
+    rbvd: &Rbvd,
+    options: &OptionSet,
+    start: (Pose, StateId),
+    goal: (Pose, StateId),
+) -> Vec<Candidate> {
     let mut legs = Vec::new();
     if start.1 == goal.1 {
         legs.push(Candidate {
@@ -197,7 +205,7 @@ fn first_legs(rbvd: &Rbvd, options: &OptionSet, start: (Pose, StateId), goal: (P
     legs
 }
 
-/// π_{n+1}: from each endpoint of the goal's state, and from the centroids next door, to the goal.
+/// `π_{n+1}`: from each endpoint of the goal's state, and from the centroids next door, to the goal.
 fn last_legs(rbvd: &Rbvd, options: &OptionSet, goal: (Pose, StateId)) -> Vec<Candidate> {
     endpoints_near(rbvd, options, goal.1)
         .into_iter()

@@ -10,7 +10,7 @@ use sharp_space::Seed;
 
 use crate::certify::Trial;
 use crate::files::FileError;
-use crate::learn::{LearnFailure, LearnSettings, Learnt, LearningMode, Lesson};
+use crate::learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson};
 use crate::leg::{Leg, LegId, Role};
 use crate::library::{OptionLibrary, StoredOption};
 use crate::percept::Workspace;
@@ -117,7 +117,7 @@ pub struct PlannedLeg {
 pub struct Solution {
     /// The problem.
     pub query: Query,
-    /// π_0, the options, π_{n+1}.
+    /// `π_0`, the options, `π_{n+1}`.
     pub legs: Vec<PlannedLeg>,
     /// Fresh runs through the whole plan, without recovery and without contact.
     pub predicted: Tally,
@@ -158,13 +158,15 @@ pub fn solve(
     monitor: &dyn Monitor,
 ) -> Result<Outcome, FileError> {
     monitor.phase(Phase::Search);
-    let known: Vec<_> = library.iter().map(|(id, stored)| (LegId::Option(id), stored.guide.clone())).collect();
+    let known: Vec<_> =
+        library.iter().map(|(id, stored)| (LegId::Option(id), stored.guide.clone())).collect();
     let planner = match Planner::new(workspace, abstraction, settings.search, query, known, settings.seed) {
         Ok(planner) => planner,
         Err(unplaced) => return Ok(Outcome::NoPlan(describe_unplaced(unplaced).to_owned())),
     };
     let before = library.iter().map(|(id, _)| LegId::Option(id)).collect();
-    let mut run = Run { workspace, query, settings, library, monitor, planner, before, learnt: BTreeMap::new() };
+    let mut run =
+        Run { workspace, query, settings, library, monitor, planner, before, learnt: BTreeMap::new() };
     let outcome = run.solve();
     monitor.phase(Phase::Done);
     outcome
@@ -192,10 +194,12 @@ struct Run<'a> {
 
 impl Run<'_> {
     fn solve(&mut self) -> Result<Outcome, FileError> {
-        self.learnt.extend(self.library.iter().map(|(id, stored)| (LegId::Option(id), stored.learnt.clone())));
+        self.learnt
+            .extend(self.library.iter().map(|(id, stored)| (LegId::Option(id), stored.learnt.clone())));
         for _ in 0..ATTEMPTS_MAX {
             let learnt = &self.learnt;
-            let Some(legs) = self.planner.plan(&|id| learnt.get(&id).map(Learnt::cost_s), self.monitor) else {
+            let Some(legs) = self.planner.plan(&|id| learnt.get(&id).map(Learnt::cost_s), self.monitor)
+            else {
                 return Ok(Outcome::NoPlan(self.describe_no_plan()));
             };
             if self.monitor.should_stop() || !self.learn_missing(&legs)? {
@@ -235,7 +239,8 @@ impl Run<'_> {
             .par_iter()
             .map(|&leg| {
                 let seed = self.settings.seed.child(&format!("leg {}", leg.id), 0);
-                let result = self.lesson(leg, self.starts(leg, seed), seed).learn(&|| self.monitor.should_stop());
+                let result =
+                    self.lesson(leg, self.starts(leg, seed), seed).learn(&|| self.monitor.should_stop());
                 if let Ok(learnt) = &result {
                     self.monitor.learnt(leg, learnt);
                 }
@@ -339,7 +344,8 @@ impl Run<'_> {
         runs: &[ChainRun],
         (wanted, round): (f64, u64),
     ) -> Option<Learnt> {
-        let arrivals: Vec<RobotState> = runs.iter().filter_map(|run| run.entries.get(index).copied()).collect();
+        let arrivals: Vec<RobotState> =
+            runs.iter().filter_map(|run| run.entries.get(index).copied()).collect();
         let seed = self.settings.seed.child(&format!("repair {}", leg.id), round);
         let starts = self.starts(leg, seed).with_arrivals(arrivals);
         let settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };

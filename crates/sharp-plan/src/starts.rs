@@ -74,14 +74,16 @@ impl Starts {
     /// One state.
     #[must_use]
     pub fn draw(&self, rng: &mut Stream) -> RobotState {
-        let pool = if self.arrivals.is_empty() || rng.random::<bool>() { &self.broad } else { &self.arrivals };
+        let pool =
+            if self.arrivals.is_empty() || rng.random::<bool>() { &self.broad } else { &self.arrivals };
         pool[rng.random_range(0..pool.len())]
     }
 }
 
 fn draw_state(workspace: &Workspace, leg: &Leg, spread: &StartSpread, rng: &mut Stream) -> RobotState {
     let start = leg.guide.start();
-    let (radius, angle) = (spread.radius_m * rng.random::<f64>().sqrt(), std::f64::consts::TAU * rng.random::<f64>());
+    let (radius, angle) =
+        (spread.radius_m * rng.random::<f64>().sqrt(), std::f64::consts::TAU * rng.random::<f64>());
     let position: Point = start.position + Vector::new(angle.cos(), angle.sin()) * radius;
     let turn = Normal::new(0.0, spread.heading_sd_rad).map_or(0.0, |normal| normal.sample(rng));
     let pose = Pose::at(position, Heading::new(start.heading.radians() + turn));
@@ -104,7 +106,14 @@ impl<'a> ViabilityProbe<'a> {
     fn new(workspace: &'a Workspace, leg: &'a Leg, seed: Seed) -> Self {
         let slow = Follower::cautious(&workspace.robot);
         let vehicle = crate::learn::kinematic_vehicle(workspace, &NoiseModel::none(), true);
-        Self { workspace, leg, policy: OptionPolicy::Follower(slow), vehicle, seed, scratch: DecisionScratch::default() }
+        Self {
+            workspace,
+            leg,
+            policy: OptionPolicy::Follower(slow),
+            vehicle,
+            seed,
+            scratch: DecisionScratch::default(),
+        }
     }
 
     fn is_viable(&mut self, state: RobotState) -> bool {
@@ -114,6 +123,7 @@ impl<'a> ViabilityProbe<'a> {
         self.vehicle.reset(state, self.seed, 0);
         let driver = Driver { leg: self.leg, policy: &self.policy, next: None };
         let percept = crate::percept::Percept::first(state);
-        driver.drive(self.workspace, &mut self.vehicle, percept, 5, &mut self.scratch).outcome != LegOutcome::Contact
+        driver.drive(self.workspace, &mut self.vehicle, percept, 5, &mut self.scratch).outcome
+            != LegOutcome::Contact
     }
 }

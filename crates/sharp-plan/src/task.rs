@@ -7,8 +7,8 @@ use sharp_rl::{Environment, EnvironmentSpec, Step};
 use sharp_sim::{KinematicSim, NoiseModel, Vehicle};
 use sharp_space::{Seed, Stream};
 
-use crate::leg::Leg;
 use crate::learn::RewardMode;
+use crate::leg::Leg;
 use crate::percept::{Percept, Tracker, Workspace};
 use crate::policy::{Form, GuideView};
 use crate::starts::Starts;
@@ -87,8 +87,10 @@ impl Environment for LegTask {
         self.tracker.update(&self.leg.guide, &percept.state.pose);
         self.actions += 1;
 
-        let success = !(report.contact && self.reward.contact_ends()) && self.leg.is_done(&percept.state.pose);
-        let reward = self.reward.of(&self.leg, &percept.state.pose, (&before, &self.tracker), report.contact, success);
+        let success =
+            !(report.contact && self.reward.contact_ends()) && self.leg.is_done(&percept.state.pose);
+        let reward =
+            self.reward.of(&self.leg, &percept.state.pose, (&before, &self.tracker), report.contact, success);
         self.observe(&percept, observation);
         self.percept = Some(percept);
         let terminated = success || (report.contact && self.reward.contact_ends());

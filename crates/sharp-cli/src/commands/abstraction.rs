@@ -4,7 +4,7 @@ use sharp_options::{OptionKind, OptionSet};
 use sharp_plan::{Workspace, write_atomic};
 
 use crate::args::Abstract;
-use crate::outcome::{Exit, Failure, to_json, say};
+use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::Stopwatch;
 use crate::report::{AbstractReport, MapReport, SolveTimes};
 use crate::{geojson, input, pictures, pipeline};
@@ -20,7 +20,11 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
 
     built.file.save(&args.out.join("abstraction.ron"))?;
     if let Some(heatmap) = &built.heatmap {
-        pictures::write(&args.out, "regions", &pictures::regions(&map.grid, heatmap, &pictures::regions_of(&built.file.rbvd)))?;
+        pictures::write(
+            &args.out,
+            "regions",
+            &pictures::regions(&map.grid, heatmap, &pictures::regions_of(&built.file.rbvd)),
+        )?;
     }
     pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
     let route = geojson::route(&abstraction, workspace.robot.max_speed_mps);

@@ -11,9 +11,9 @@ use sharp_space::Seed;
 
 use crate::args::{AbstractionArgs, Eval, Guide, Kind, Learning, MapArgs, Metric, Solve, Suite, Unknown};
 use crate::commands::solve::{Solved, solve_problem};
-use crate::outcome::{Exit, Failure, to_json, say};
-use crate::progress::{bar, is_interrupted};
+use crate::outcome::{Exit, Failure, say, to_json};
 use crate::pictures;
+use crate::progress::{bar, is_interrupted};
 use crate::report::{Reuse, RunReport, SolveTimes};
 
 /// One problem for one robot with one kind of option.
@@ -62,7 +62,9 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
         if is_interrupted() {
             return Ok(Exit::Interrupted);
         }
-        progress.set_message(format!("{} P{} {} {:?}", case.env, case.problem, case.robot, case.kind).to_lowercase());
+        progress.set_message(
+            format!("{} P{} {} {:?}", case.env, case.problem, case.robot, case.kind).to_lowercase(),
+        );
         if !lines.iter().any(|line| is_result_of(line, case, args, seed)) {
             let Some(line) = evaluate(case, args, seed)? else { return Ok(Exit::Interrupted) };
             progress.println(row_text(&line));
@@ -98,7 +100,12 @@ fn cases(suite: Suite) -> Result<Vec<Case>, Failure> {
         let problems = sharp_maps::load(env, &sharp_maps::LoadOptions::default())?.problems.len();
         for &robot in robots {
             for kind in [Kind::Centroid, Kind::Interface] {
-                cases.extend((1..=problems).map(|problem| Case { env: env.to_owned(), robot, kind, problem }));
+                cases.extend((1..=problems).map(|problem| Case {
+                    env: env.to_owned(),
+                    robot,
+                    kind,
+                    problem,
+                }));
             }
         }
     }
@@ -129,8 +136,9 @@ fn read_lines(path: &Path) -> Result<Vec<ResultLine>, Failure> {
     text.lines()
         .enumerate()
         .map(|(index, line)| {
-            serde_json::from_str(line)
-                .map_err(|error| Failure::new("FILE_INVALID", format!("{} line {}: {error}", path.display(), index + 1)))
+            serde_json::from_str(line).map_err(|error| {
+                Failure::new("FILE_INVALID", format!("{} line {}: {error}", path.display(), index + 1))
+            })
         })
         .collect()
 }
@@ -175,7 +183,8 @@ fn evaluate(case: &Case, args: &Eval, seed: u64) -> Result<Option<ResultLine>, F
 }
 
 fn solve_args(case: &Case, args: &Eval, library: PathBuf, out: PathBuf) -> Solve {
-    let map = MapArgs { map: case.env.clone(), resolution: None, unknown: Unknown::Blocked, allow_outside: false };
+    let map =
+        MapArgs { map: case.env.clone(), resolution: None, unknown: Unknown::Blocked, allow_outside: false };
     let abstraction = AbstractionArgs {
         robot: case.robot.to_owned(),
         options: case.kind,
@@ -198,7 +207,12 @@ fn solve_args(case: &Case, args: &Eval, library: PathBuf, out: PathBuf) -> Solve
 }
 
 /// Executes the plan, draws what was driven, and counts.
-fn drive(plan: &Arc<sharp_plan::Plan>, episodes: u32, seed: u64, folder: &Path) -> Result<RunReport, Failure> {
+fn drive(
+    plan: &Arc<sharp_plan::Plan>,
+    episodes: u32,
+    seed: u64,
+    folder: &Path,
+) -> Result<RunReport, Failure> {
     let begun = Instant::now();
     // Executions draw their noise from another root than learning did.
     let settings = RunSettings::new(plan, episodes, Seed(seed).child("evaluation", 0));
@@ -210,8 +224,16 @@ fn drive(plan: &Arc<sharp_plan::Plan>, episodes: u32, seed: u64, folder: &Path) 
 fn row_text(line: &ResultLine) -> String {
     format!(
         "{} P{} {} {}: {} of {} (predicted {:.3}), reused {} of {}, {:.1} s",
-        line.env, line.problem, line.robot, line.options, line.successes, line.episodes, line.predicted_success,
-        line.reuse.reused, line.reuse.uses, line.time_s.total
+        line.env,
+        line.problem,
+        line.robot,
+        line.options,
+        line.successes,
+        line.episodes,
+        line.predicted_success,
+        line.reuse.reused,
+        line.reuse.uses,
+        line.time_s.total
     )
 }
 
@@ -227,9 +249,25 @@ fn table(lines: &[&ResultLine]) -> String {
         let _ = writeln!(
             text,
             "| {} | P{} | {} | {} | {}/{} | {:.2}-{:.2} | {:.3} | {}/{} | {:.1} | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} |",
-            line.env, line.problem, line.robot, line.options, line.successes, line.episodes, tally.lower95(),
-            tally.upper95(), line.predicted_success, line.reuse.reused, line.reuse.uses, line.mean_sim_time_s,
-            time.regions, time.abstraction, time.search, time.guide, time.learn, time.verify, time.total
+            line.env,
+            line.problem,
+            line.robot,
+            line.options,
+            line.successes,
+            line.episodes,
+            tally.lower95(),
+            tally.upper95(),
+            line.predicted_success,
+            line.reuse.reused,
+            line.reuse.uses,
+            line.mean_sim_time_s,
+            time.regions,
+            time.abstraction,
+            time.search,
+            time.guide,
+            time.learn,
+            time.verify,
+            time.total
         );
     }
     text

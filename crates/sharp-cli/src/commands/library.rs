@@ -6,7 +6,7 @@ use serde::Serialize;
 use sharp_plan::OptionLibrary;
 
 use crate::args::Library;
-use crate::outcome::{Exit, Failure, to_json, say};
+use crate::outcome::{Exit, Failure, say, to_json};
 
 #[derive(Serialize)]
 struct Report {

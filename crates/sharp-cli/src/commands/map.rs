@@ -6,9 +6,9 @@ use sharp_rbvd::Rbvd;
 use sharp_space::Occupancy;
 
 use crate::args::Map;
-use crate::{input, pipeline};
-use crate::outcome::{Exit, Failure, to_json, say};
+use crate::outcome::{Exit, Failure, say, to_json};
 use crate::report::MapReport;
+use crate::{input, pipeline};
 
 #[derive(Serialize)]
 struct Info {
@@ -58,9 +58,20 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
             } else {
                 say!(
                     "{}: {} x {} cells of {} m = {:.1} x {:.1} m, origin ({}, {}, {})\n{:.1} m2 free ({:.1} %), {:.1} % occupied, {:.1} % unknown, {} problems",
-                    info.map.name, info.width, info.height, info.map.resolution_m, info.map.width_m, info.map.height_m,
-                    info.origin[0], info.origin[1], info.origin[2], info.free_m2, 100.0 * info.free,
-                    100.0 * info.occupied, 100.0 * info.unknown, info.problems
+                    info.map.name,
+                    info.width,
+                    info.height,
+                    info.map.resolution_m,
+                    info.map.width_m,
+                    info.map.height_m,
+                    info.origin[0],
+                    info.origin[1],
+                    info.origin[2],
+                    info.free_m2,
+                    100.0 * info.free,
+                    100.0 * info.occupied,
+                    100.0 * info.unknown,
+                    info.problems
                 );
             }
             Ok(Exit::Done)

@@ -111,7 +111,13 @@ fn train(args: &RegionsTrain, seed: u64, json: bool) -> Result<Exit, Failure> {
     if json {
         say!("{}", to_json(&report));
     } else {
-        say!("{}: {} bytes after {:.0} s, {:.0} s of it labels", report.file, report.bytes, total, labelled_s);
+        say!(
+            "{}: {} bytes after {:.0} s, {:.0} s of it labels",
+            report.file,
+            report.bytes,
+            total,
+            labelled_s
+        );
     }
     Ok(Exit::Done)
 }
@@ -131,7 +137,10 @@ fn device(name: &str) -> Result<ComputeDevice, Failure> {
         #[cfg(feature = "ndarray")]
         "ndarray" => Ok(ComputeDevice::Ndarray),
         #[cfg(not(feature = "ndarray"))]
-        "ndarray" => Err(Failure::new("USAGE", "--device ndarray is not compiled in; build with --features ndarray, as cargo xtask train-regions does")),
+        "ndarray" => Err(Failure::new(
+            "USAGE",
+            "--device ndarray is not compiled in; build with --features ndarray, as cargo xtask train-regions does",
+        )),
         _ => Err(Failure::new("USAGE", format!("--device is {name:?}, expected flex or ndarray"))),
     }
 }
@@ -170,7 +179,8 @@ fn region_report(workspace: &Workspace, region: &Region) -> RegionReport {
 
 fn score(args: &RegionsScore, seed: u64, json: bool) -> Result<Exit, Failure> {
     let robot = input::robot(&args.robot)?;
-    let kinds: Vec<_> = HELD_OUT_KINDS.iter().copied().cycle().take(HELD_OUT_KINDS.len() * args.maps as usize).collect();
+    let kinds: Vec<_> =
+        HELD_OUT_KINDS.iter().copied().cycle().take(HELD_OUT_KINDS.len() * args.maps as usize).collect();
     let spinner = progress::spinner("solving problems on held-out maps");
     let maps = scoring_maps(&kinds, &label_robot(&robot), TrainSettings::default().labels, Seed(seed));
     let settings = RegionSettings::default();
@@ -189,15 +199,25 @@ fn score(args: &RegionsScore, seed: u64, json: bool) -> Result<Exit, Failure> {
     }
     spinner.finish_and_clear();
     let [net, geometric, random] = scores.map(|scores| RegionScore::mean(&scores));
-    let report =
-        ScoreReport { schema: "sharp.regions.score/1", robot: robot.name, maps: maps.len(), net, geometric, random };
+    let report = ScoreReport {
+        schema: "sharp.regions.score/1",
+        robot: robot.name,
+        maps: maps.len(),
+        net,
+        geometric,
+        random,
+    };
     if json {
         say!("{}", to_json(&report));
     } else {
-        say!("| regions from | number | mu | density | precision | recall | IoU |\n|---|---|---|---|---|---|---|");
+        say!(
+            "| regions from | number | mu | density | precision | recall | IoU |\n|---|---|---|---|---|---|---|"
+        );
         for (name, score) in [("net", net), ("geometric", geometric), ("random", random)] {
             let RegionScore { regions, mu, density, precision, recall, iou } = score;
-            say!("| {name} | {regions:.1} | {mu:.2} | {density:.2} | {precision:.2} | {recall:.2} | {iou:.2} |");
+            say!(
+                "| {name} | {regions:.1} | {mu:.2} | {density:.2} | {precision:.2} | {recall:.2} | {iou:.2} |"
+            );
         }
     }
     Ok(Exit::Done)

@@ -10,16 +10,17 @@ use sharp_sim::SimulatorKind;
 use sharp_space::Seed;
 
 use crate::args::{Collisions, Run, Switch};
-use crate::outcome::{Exit, Failure, to_json, say};
+use crate::outcome::{Exit, Failure, say, to_json};
 use crate::report::RunReport;
 use crate::{input, pictures, progress};
 
 pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     let plan = Arc::new(load_plan(&args.plan_dir)?);
     let mut settings = RunSettings::new(&plan, args.episodes, Seed(seed));
-    settings.simulator = args.simulator.parse::<SimulatorKind>().map_err(|error| {
-        Failure::new("USAGE", format!("--simulator: {error}"))
-    })?;
+    settings.simulator = args
+        .simulator
+        .parse::<SimulatorKind>()
+        .map_err(|error| Failure::new("USAGE", format!("--simulator: {error}")))?;
     if let Some(noise) = &args.noise {
         settings.noise = input::noise(noise)?;
     }
@@ -64,7 +65,9 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
 /// Reads the plan in `folder` with its map.
 pub(crate) fn load_plan(folder: &Path) -> Result<Plan, Failure> {
     let map = folder.join("map.yaml");
-    let spec = map.to_str().ok_or_else(|| Failure::new("FILE_INVALID", format!("{} is not printable", map.display())))?;
+    let spec = map
+        .to_str()
+        .ok_or_else(|| Failure::new("FILE_INVALID", format!("{} is not printable", map.display())))?;
     let grid = load(spec, &LoadOptions::default())?.grid;
     Ok(Plan::load(folder, grid)?)
 }

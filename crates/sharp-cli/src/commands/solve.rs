@@ -5,11 +5,13 @@ use std::time::Duration;
 
 use sharp_guide::GuidePlanner;
 use sharp_maps::MapFile;
-use sharp_plan::{LearningMode, Outcome, Plan, Query, Solution, SolveSettings, Workspace, solve, write_atomic};
+use sharp_plan::{
+    LearningMode, Outcome, Plan, Query, Solution, SolveSettings, Workspace, solve, write_atomic,
+};
 use sharp_space::Seed;
 
 use crate::args::{Guide, Learning, Solve};
-use crate::outcome::{Exit, Failure, to_json, say};
+use crate::outcome::{Exit, Failure, say, to_json};
 use crate::pipeline::{self, Built};
 use crate::progress::{SolveMonitor, Stopwatch, is_interrupted};
 use crate::report::{MapReport, Reuse, SolveReport, SolveTimes};
@@ -86,16 +88,27 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64) -> Result<Solved, Failure> 
             (report, Some((plan, folder)))
         }
         Outcome::NoPlan(reason) => (SolveReport { status: "no_plan", reason: Some(reason), ..report }, None),
-        Outcome::Stopped => (SolveReport { status: "timeout", reason: Some("stopped before a plan was verified; what was learnt is kept".to_owned()), ..report }, None),
+        Outcome::Stopped => (
+            SolveReport {
+                status: "timeout",
+                reason: Some("stopped before a plan was verified; what was learnt is kept".to_owned()),
+                ..report
+            },
+            None,
+        ),
     };
     report.time_s = SolveTimes::from(&stopwatch);
-    let plan = plan.map(|(plan, folder)| write_plan(&plan, &folder, &built, &query, &report).map(|()| plan)).transpose()?;
+    let plan = plan
+        .map(|(plan, folder)| write_plan(&plan, &folder, &built, &query, &report).map(|()| plan))
+        .transpose()?;
     Ok(Solved { report, plan })
 }
 
 fn limit(seconds: f64) -> Result<Duration, Failure> {
     let duration = Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero());
-    duration.ok_or_else(|| Failure::new("USAGE", format!("--time-limit is {seconds}, expected a positive number of seconds")))
+    duration.ok_or_else(|| {
+        Failure::new("USAGE", format!("--time-limit is {seconds}, expected a positive number of seconds"))
+    })
 }
 
 fn blank_report(
@@ -155,7 +168,11 @@ fn write_plan(
     plan.save(folder, &built.file)?;
     sharp_maps::save_ros(&plan.workspace.grid, &folder.join("map.yaml"))?;
     if let Some(heatmap) = &built.heatmap {
-        pictures::write(folder, "regions", &pictures::regions(&plan.workspace.grid, heatmap, &pictures::regions_of(&built.file.rbvd)))?;
+        pictures::write(
+            folder,
+            "regions",
+            &pictures::regions(&plan.workspace.grid, heatmap, &pictures::regions_of(&built.file.rbvd)),
+        )?;
     }
     pictures::write(folder, "abstraction", &pictures::abstraction(&plan.workspace.grid, &plan.abstraction))?;
     pictures::write(folder, "plan", &pictures::plan(plan, query, &[]))?;
@@ -166,9 +183,19 @@ fn write_plan(
 fn print_report(report: &SolveReport) {
     say!(
         "{}: {} on map {}, {} options, {} noise, {} learning",
-        report.status, report.robot, report.map.name, report.options, report.noise, report.learning
+        report.status,
+        report.robot,
+        report.map.name,
+        report.options,
+        report.noise,
+        report.learning
     );
-    say!("{} abstract states (regions: {}), {} options", report.states, report.regions, report.options_available);
+    say!(
+        "{} abstract states (regions: {}), {} options",
+        report.states,
+        report.regions,
+        report.options_available
+    );
     if let Some(reason) = &report.reason {
         say!("{reason}");
     }
@@ -197,7 +224,13 @@ fn print_report(report: &SolveReport) {
     let time = &report.time_s;
     say!(
         "took {:.1} s: regions {:.1}, abstraction {:.1}, search {:.1}, guides {:.1}, learning {:.1}, verification {:.1}",
-        time.total, time.regions, time.abstraction, time.search, time.guide, time.learn, time.verify
+        time.total,
+        time.regions,
+        time.abstraction,
+        time.search,
+        time.guide,
+        time.learn,
+        time.verify
     );
     if let Some(folder) = &report.plan_dir {
         say!("plan written to {folder}; next: sharp run {folder}");
