@@ -50,7 +50,7 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
 pub(crate) fn solve_problem(args: &Solve, seed: u64) -> Result<Solved, Failure> {
     let mut stopwatch = Stopwatch::start();
     stopwatch.enter("load");
-    let time_limit = args.time_limit.map(|seconds| limit(seconds)).transpose()?;
+    let time_limit = args.time_limit.map(limit).transpose()?;
     let map = input::map(&args.map)?;
     let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
     let noise = input::noise(&args.noise)?;
