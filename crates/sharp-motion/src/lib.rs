@@ -25,6 +25,7 @@
 //! ```
 
 mod dubins;
+mod hybrid_astar;
 mod learn_and_link;
 mod maneuver;
 mod nearest;
@@ -38,6 +39,7 @@ mod shortcut;
 mod steering;
 mod tree;
 
+pub use hybrid_astar::{HybridSettings, hybrid_astar};
 pub use learn_and_link::learn_and_link;
 pub use maneuver::{Maneuver, Primitive};
 pub use nearest::Nearest;

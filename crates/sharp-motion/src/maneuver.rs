@@ -36,7 +36,7 @@ impl Primitive {
         if self.travel_m > 0.0 { self.travel_m } else { self.turn_rad.abs() }
     }
 
-    fn cost_m(&self) -> f64 {
+    pub(crate) fn cost_m(&self) -> f64 {
         if self.travel_m > 0.0 { self.travel_m } else { PIVOT_COST_M_PER_RAD * self.turn_rad.abs() }
     }
 
