@@ -5,9 +5,8 @@ use sharp_sim::{NoiseModel, RobotState, Simulator, Vehicle};
 use sharp_space::Seed;
 
 use crate::learn::kinematic_vehicle;
-use crate::leg::Leg;
 use crate::percept::{Percept, Workspace};
-use crate::policy::{DecisionScratch, OptionPolicy};
+use crate::policy::DecisionScratch;
 use crate::rollout::{ChainRun, Driver, LegOutcome, drive_chain};
 use crate::starts::Starts;
 use crate::stats::Tally;
@@ -35,11 +34,10 @@ pub struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Runs `policy` alone on `leg` from `starts`.
+    /// Runs `driver` alone from `starts`.
     #[must_use]
-    pub fn of_leg(&self, leg: &Leg, policy: &OptionPolicy, starts: &Starts) -> Certificate {
-        let horizon = leg.horizon_actions(crate::SLOWEST_REACH_M);
-        let driver = Driver { leg, policy, next: None };
+    pub fn of_leg(&self, driver: &Driver<'_>, starts: &Starts) -> Certificate {
+        let horizon = driver.leg.horizon_actions(crate::SLOWEST_REACH_M);
         let ends =
             self.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
                 let state = starts.draw(&mut self.seed.stream("trial start", episode));

@@ -13,6 +13,7 @@ use crate::certify::{Certificate, Trial};
 use crate::leg::Leg;
 use crate::percept::{Tracker, Workspace};
 use crate::policy::{Correction, Follower, Form, OptionPolicy};
+use crate::rollout::Driver;
 use crate::starts::Starts;
 use crate::stats::Tally;
 use crate::task::LegTask;
@@ -174,6 +175,8 @@ pub struct Lesson<'a> {
     pub workspace: &'a Workspace,
     /// The leg.
     pub leg: &'a Arc<Leg>,
+    /// The leg after it, where one is known: followers look ahead into its guide.
+    pub next: Option<&'a Arc<Leg>>,
     /// Where its episodes begin.
     pub starts: Arc<Starts>,
     /// The noise of the simulator.
@@ -206,10 +209,14 @@ impl Lesson<'_> {
         }
     }
 
+    fn driver<'b>(&'b self, policy: &'b OptionPolicy) -> Driver<'b> {
+        Driver { leg: self.leg, policy, next: self.next.map(|next| &next.guide) }
+    }
+
     /// What `policy` holds on the lesson's fresh episodes.
     #[must_use]
     pub fn certify(&self, policy: &OptionPolicy) -> Certificate {
-        self.trial(self.settings.certify_episodes, "certify", 0).of_leg(self.leg, policy, &self.starts)
+        self.trial(self.settings.certify_episodes, "certify", 0).of_leg(&self.driver(policy), &self.starts)
     }
 
     fn learn_fast(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
@@ -244,7 +251,8 @@ impl Lesson<'_> {
         Follower::candidates(&self.workspace.robot)
             .into_iter()
             .map(|follower| {
-                (follower, trial.of_leg(self.leg, &OptionPolicy::Follower(follower), &self.starts))
+                let policy = OptionPolicy::Follower(follower);
+                (follower, trial.of_leg(&self.driver(&policy), &self.starts))
             })
             .collect()
     }
@@ -275,7 +283,8 @@ impl Lesson<'_> {
         let task = |index| {
             let starts = Arc::clone(&self.starts);
             let noise = (self.noise, self.seed.child("environment", index));
-            LegTask::new(self.workspace, Arc::clone(self.leg), form, reward, starts, noise)
+            let legs = (Arc::clone(self.leg), self.next.cloned());
+            LegTask::new(self.workspace, legs, form, reward, starts, noise)
         };
         let mut tasks: Vec<LegTask> = (0..self.settings.environments).map(task).collect();
         let mut observer = |_: &Progress<'_>| {

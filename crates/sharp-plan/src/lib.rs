@@ -5,6 +5,7 @@
 //! lacks and returns a [`Solution`] with its measured odds. A [`Plan`] keeps a solution in a folder;
 //! [`run`] drives it in a simulator, and a [`ComposedPolicy`] drives anything else.
 
+mod baseline;
 mod certify;
 mod composed;
 mod execute;
@@ -23,6 +24,10 @@ mod starts;
 mod stats;
 mod task;
 
+pub use baseline::{
+    Baseline, ComparisonSettings, Driven, Host, Mppi, MppiSettings, Pilot, Readiness, Route, Rrt, RrtFollowing, Sac,
+    SacBudget, Situation, SpeedRule, Track, TrackSettings, compare, plan_route,
+};
 pub use certify::{Certificate, Trial};
 pub use composed::{ComposedPolicy, Decision, Events};
 pub use execute::{Episode, EpisodeEnd, RunSettings, run, success};

@@ -20,6 +20,9 @@ use crate::percept::Workspace;
 use crate::search::{Candidate, OptionGraph};
 use crate::sharp::{Monitor, Phase};
 
+/// Legs whose ends are further apart than this cross their interfaces at right angles, metres.
+const CROSSING_M: f64 = 1.2;
+
 /// The abstraction of one map for one robot: Φ, Ψ and O.
 #[derive(Clone, Debug)]
 pub struct Abstraction {
@@ -36,6 +39,9 @@ pub struct SearchSettings {
     pub nominal_speed_mps: f64,
     /// Seconds added to a leg without a policy: what training is worth; 0 is the paper's rule.
     pub untrained_surcharge_s: f64,
+    /// Seconds added to a first or last leg that passes a centroid by: no later problem can reuse it,
+    /// and the paper knows no such leg.
+    pub shortcut_surcharge_s: f64,
     /// Largest turn between two guides that a robot takes in its stride, radians.
     pub smooth_turn_rad: f64,
     /// How guides are planned.
@@ -49,6 +55,7 @@ impl SearchSettings {
         Self {
             nominal_speed_mps: 0.5 * workspace.robot.max_speed_mps,
             untrained_surcharge_s: 2.0,
+            shortcut_surcharge_s: 6.0,
             // The footprint swings out in a turn: beyond 75 degrees it needs room or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),
             guide: GuideSettings::default(),
@@ -163,7 +170,8 @@ impl<'a> Planner<'a> {
         };
         let least_s = straight_m / self.workspace.robot.max_speed_mps;
         let estimated = length_m / self.settings.nominal_speed_mps + self.settings.untrained_surcharge_s;
-        measured.map_or(estimated, |seconds| seconds.max(least_s))
+        let shortcut_s = if leg.is_shortcut { self.settings.shortcut_surcharge_s } else { 0.0 };
+        measured.map_or(estimated, |seconds| seconds.max(least_s)) + shortcut_s
     }
 
     /// Seconds lost where one guide ends and the next begins; infinite where the robot cannot turn so.
@@ -199,19 +207,17 @@ impl<'a> Planner<'a> {
                 || near(source, cell)
                 || near(target, cell)
         };
+        // On a short leg two crossing directions would leave no room for the way between them.
+        let crosses = (candidate.end - candidate.start).norm() > CROSSING_M;
+        let crossing = |endpoint: Option<&Endpoint>, to| endpoint.filter(|_| crosses).and_then(|end| approach(end, to));
         let start_heading = match id {
             LegId::First(_) | LegId::Direct => Some(self.query.start.heading),
-            LegId::Option(option) => {
-                source.and_then(|end| approach(end, option.through().unwrap_or(option.to())))
-            }
-            LegId::Last(_, state) => source.and_then(|end| approach(end, state)),
+            LegId::Option(option) => crossing(source, option.through().unwrap_or(option.to())),
+            LegId::Last(_, state) => crossing(source, state),
         };
         let request = GuideRequest {
             start: GuideEnd { position: candidate.start, heading: start_heading },
-            goal: GuideEnd {
-                position: candidate.end,
-                heading: target.and_then(|end| approach(end, candidate.to)),
-            },
+            goal: GuideEnd { position: candidate.end, heading: crossing(target, candidate.to) },
             allowed: &allowed,
         };
         let mut rng = self.seed.stream(&format!("guide {id}"), 0);

@@ -45,6 +45,8 @@ pub struct Candidate {
     pub from: StateId,
     /// The state it ends in.
     pub to: StateId,
+    /// True for a first or last leg past a centroid of the state it begins or ends in.
+    pub is_shortcut: bool,
     /// Centre of the initiation set.
     pub start: Point,
     /// Centre of the termination set.
@@ -165,6 +167,7 @@ fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
         id: LegId::Option(spec.id),
         from: spec.id.from(),
         to: spec.id.to(),
+        is_shortcut: false,
         start: options.endpoint(spec.initiation).center,
         end: options.endpoint(spec.termination).center,
         endpoint: Some(spec.termination),
@@ -185,6 +188,7 @@ fn first_legs(
             id: LegId::Direct,
             from: start.1,
             to: goal.1,
+            is_shortcut: false,
             start: start.0.position,
             end: goal.0.position,
             endpoint: None,
@@ -197,6 +201,7 @@ fn first_legs(
             id: LegId::First(endpoint_id.0),
             from: start.1,
             to,
+            is_shortcut: is_centroid_elsewhere(endpoint, start.1),
             start: start.0.position,
             end: endpoint.center,
             endpoint: Some(endpoint_id),
@@ -217,6 +222,7 @@ fn last_legs(rbvd: &Rbvd, options: &OptionSet, goal: (Pose, StateId)) -> Vec<Can
                 id: LegId::Last(endpoint_id.0, from),
                 from,
                 to: goal.1,
+                is_shortcut: is_centroid_elsewhere(endpoint, goal.1),
                 start: endpoint.center,
                 end: goal.0.position,
                 endpoint: Some(endpoint_id),
@@ -233,6 +239,10 @@ fn endpoints_near(rbvd: &Rbvd, options: &OptionSet, state: StateId) -> Vec<Endpo
     };
     let numbered = options.endpoints().iter().zip(0..);
     numbered.filter(|(endpoint, _)| is_near(endpoint)).map(|(_, index)| EndpointId(index)).collect()
+}
+
+fn is_centroid_elsewhere(endpoint: &Endpoint, state: StateId) -> bool {
+    matches!(endpoint.site, EndpointSite::Centroid(other) if other != state)
 }
 
 /// The state on the far side of an interface, or the centroid's own.

@@ -261,7 +261,7 @@ impl Run<'_> {
 
     fn lesson<'b>(&'b self, leg: &'b Arc<Leg>, starts: Starts, seed: Seed) -> Lesson<'b> {
         let (workspace, noise, settings) = (self.workspace, &self.settings.noise, &self.settings.learn);
-        Lesson { workspace, leg, starts: Arc::new(starts), noise, settings, seed }
+        Lesson { workspace, leg, next: None, starts: Arc::new(starts), noise, settings, seed }
     }
 
     fn starts(&self, leg: &Leg, seed: Seed) -> Starts {
@@ -323,7 +323,7 @@ impl Run<'_> {
         let is_weak = |tally: &Tally| tally.episodes >= 50 && tally.rate() < leg_wanted;
         let on_arrival = tallies(&runs, legs.len());
         let weak: Vec<usize> = (0..legs.len()).filter(|&index| is_weak(&on_arrival[index])).collect();
-        let relearn = |&index: &usize| self.relearn(&legs[index], index, &runs, (leg_wanted, round));
+        let relearn = |&index: &usize| self.relearn(legs, index, &runs, (leg_wanted, round));
         let results: Vec<_> = weak.par_iter().map(relearn).collect();
         let mut better = false;
         for (index, learnt) in weak.into_iter().zip(results) {
@@ -336,20 +336,23 @@ impl Run<'_> {
         Ok(better)
     }
 
-    /// A policy for `leg` that holds more often than its present one on what `runs` arrived with.
+    /// A policy for leg number `index` that holds more often than its present one on what `runs`
+    /// arrived with.
     fn relearn(
         &self,
-        leg: &Arc<Leg>,
+        legs: &[Arc<Leg>],
         index: usize,
         runs: &[ChainRun],
         (wanted, round): (f64, u64),
     ) -> Option<Learnt> {
+        let leg = &legs[index];
         let arrivals: Vec<RobotState> =
             runs.iter().filter_map(|run| run.entries.get(index).copied()).collect();
         let seed = self.settings.seed.child(&format!("repair {}", leg.id), round);
         let starts = self.starts(leg, seed).with_arrivals(arrivals);
         let settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
-        let lesson = Lesson { settings: &settings, ..self.lesson(leg, starts, seed) };
+        let next = legs.get(index + 1);
+        let lesson = Lesson { settings: &settings, next, ..self.lesson(leg, starts, seed) };
         let old = &self.learnt[&leg.id];
         let present = lesson.certify(&old.policy);
         let mut new = lesson.learn(&|| self.monitor.should_stop()).ok()?;

@@ -18,6 +18,7 @@ use crate::starts::Starts;
 pub struct LegTask {
     workspace: Workspace,
     leg: Arc<Leg>,
+    next: Option<Arc<Leg>>,
     form: Form,
     reward: RewardMode,
     starts: Arc<Starts>,
@@ -29,11 +30,12 @@ pub struct LegTask {
 }
 
 impl LegTask {
-    /// The task of `leg` under `noise`; episodes draw their noise from `seed`.
+    /// The task of the first of `legs`, with the one after it where it is known, under `noise`;
+    /// episodes draw their noise from `seed`.
     #[must_use]
     pub fn new(
         workspace: &Workspace,
-        leg: Arc<Leg>,
+        (leg, next): (Arc<Leg>, Option<Arc<Leg>>),
         form: Form,
         reward: RewardMode,
         starts: Arc<Starts>,
@@ -43,6 +45,7 @@ impl LegTask {
         Self {
             workspace: workspace.clone(),
             leg,
+            next,
             form,
             reward,
             starts,
@@ -54,9 +57,12 @@ impl LegTask {
         }
     }
 
+    fn view(&self) -> GuideView<'_> {
+        GuideView { guide: &self.leg.guide, next: self.next.as_ref().map(|next| &next.guide) }
+    }
+
     fn observe(&self, percept: &Percept, observation: &mut [f32]) {
-        let view = GuideView { guide: &self.leg.guide, next: None };
-        self.form.observe(&self.workspace, percept, &self.tracker, &view, observation);
+        self.form.observe(&self.workspace, percept, &self.tracker, &self.view(), observation);
     }
 }
 
@@ -79,8 +85,7 @@ impl Environment for LegTask {
     fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
         let percept = self.percept.expect("reset comes before step");
         let pose = percept.state.pose;
-        let view = GuideView { guide: &self.leg.guide, next: None };
-        let command = self.form.waypoint(&self.workspace.robot, &pose, &self.tracker, &view, action);
+        let command = self.form.waypoint(&self.workspace.robot, &pose, &self.tracker, &self.view(), action);
         let report = self.vehicle.act_at(command.to_world(&pose), command.speed_mps);
         let percept = percept.next(command, report.after);
         let before = self.tracker;

@@ -1,0 +1,284 @@
+//! Model-predictive path integral control along a planned path (Williams, Aldrich and Theodorou 2017).
+//!
+//! Each decision rolls out a few hundred sequences of actions in a model without noise: what the
+//! tracking follower would do from where the model is, plus a perturbation of bearing and speed. The
+//! perturbations are averaged with weights exp(−cost / temperature), the first is carried out, and
+//! the rest begins the next decision. The model is the robot's own waypoint controller on a body that
+//! follows its wheels.
+
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+use sharp_guide::GuidePath;
+use sharp_sim::{ActionSettings, Command, Drive, RobotModel, RobotState, WaypointController};
+use sharp_space::{CollisionChecker, Heading, Pose, Seed, Stream, Vector};
+
+use crate::baseline::route::{OnRoute, Route};
+use crate::baseline::track::TrackSettings;
+use crate::baseline::{Baseline, Pilot, Readiness, Situation};
+use crate::percept::{Tracker, Workspace};
+use crate::planner::Query;
+use crate::policy::PolarWaypoint;
+
+/// Time step of the model, seconds: two control periods.
+const MODEL_DT_S: f64 = 0.1;
+
+/// Sampling and cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MppiSettings {
+    /// Sequences rolled out for a decision.
+    pub samples: usize,
+    /// Actions in a sequence.
+    pub horizon: usize,
+    /// Standard deviation of the bearing's perturbation, radians.
+    pub bearing_sd_rad: f64,
+    /// Standard deviation of the speed's perturbation, as a share of the top speed.
+    pub speed_sd: f64,
+    /// Cost that a sequence may be worse than the best and still weigh 1/e.
+    pub temperature: f64,
+    /// Room at the sides below which it costs, metres.
+    pub room_m: f64,
+    /// Cost of a second without any room at top speed; grows with the square of what is lacking.
+    pub room_weight: f64,
+    /// Cost of a second one metre off the path; grows with the square.
+    pub cross_weight: f64,
+    /// Cost of a contact.
+    pub contact_cost: f64,
+    /// What the perturbations are added to.
+    pub base: TrackSettings,
+}
+
+impl MppiSettings {
+    /// What did best on generated maps (see `docs/algorithms/baselines.md`).
+    #[must_use]
+    pub fn new(robot: &RobotModel) -> Self {
+        Self {
+            samples: 256,
+            horizon: 8,
+            bearing_sd_rad: 0.25,
+            speed_sd: 0.2,
+            temperature: 0.3,
+            room_m: 0.3,
+            room_weight: 4.0,
+            cross_weight: 2.0,
+            contact_cost: 100.0,
+            base: TrackSettings::new(robot),
+        }
+    }
+}
+
+/// The baseline `mppi`.
+#[derive(Clone, Debug)]
+pub struct Mppi<'a> {
+    /// Map and robot.
+    pub workspace: &'a Workspace,
+    /// The problem.
+    pub query: Query,
+    /// The path of every episode's beginning.
+    pub route: Route,
+    /// Sampling and cost.
+    pub settings: MppiSettings,
+    /// Root of the perturbations.
+    pub seed: Seed,
+}
+
+impl Baseline for Mppi<'_> {
+    fn pilot(&self, episode: u64) -> Box<dyn Pilot + '_> {
+        let Self { workspace, query, route, settings, seed } = self;
+        Box::new(MppiPilot {
+            workspace,
+            settings,
+            on_route: OnRoute::new(workspace, *query, route.clone()),
+            model: Model::new(&workspace.robot),
+            mean: vec![Push::default(); settings.horizon],
+            seed: seed.child("mppi", episode),
+            decisions: 0,
+        })
+    }
+}
+
+/// How an action differs from the follower's.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Push {
+    bearing_rad: f64,
+    speed_mps: f64,
+}
+
+impl Push {
+    fn applied(self, robot: &RobotModel, base: PolarWaypoint) -> PolarWaypoint {
+        let slowest_mps = robot.min_speed_mps.max(0.1 * robot.max_speed_mps);
+        PolarWaypoint {
+            bearing_rad: base.bearing_rad + self.bearing_rad,
+            speed_mps: (base.speed_mps + self.speed_mps).clamp(slowest_mps, robot.max_speed_mps),
+            ..base
+        }
+    }
+}
+
+#[derive(Debug)]
+struct MppiPilot<'a> {
+    workspace: &'a Workspace,
+    settings: &'a MppiSettings,
+    on_route: OnRoute<'a>,
+    model: Model,
+    /// The sequence that the next decision begins with.
+    mean: Vec<Push>,
+    seed: Seed,
+    decisions: u64,
+}
+
+impl Pilot for MppiPilot<'_> {
+    fn prepare(&mut self, situation: &Situation) -> Readiness {
+        let readiness = self.on_route.prepare(situation);
+        if readiness != Readiness::Ready {
+            self.mean.fill(Push::default());
+        }
+        readiness
+    }
+
+    fn decide(&mut self, state: &RobotState) -> PolarWaypoint {
+        let mut rng = self.seed.stream("decision", self.decisions);
+        self.decisions += 1;
+        let samples = self.samples(&mut rng);
+        let costs: Vec<f64> = samples.chunks(self.settings.horizon).map(|pushes| self.cost(state, pushes)).collect();
+        self.mean = weighted_mean(&samples, &costs, self.settings);
+        let OnRoute { route, tracker, .. } = &self.on_route;
+        let base = self.settings.base.waypoint(self.workspace, route, tracker, state);
+        let command = self.mean[0].applied(&self.workspace.robot, base);
+        self.mean.rotate_left(1);
+        *self.mean.last_mut().expect("a sequence has actions") = Push::default();
+        command
+    }
+}
+
+impl MppiPilot<'_> {
+    /// All sequences one after the other; the first two are the follower itself and the mean.
+    fn samples(&self, rng: &mut Stream) -> Vec<Push> {
+        let MppiSettings { samples, horizon, bearing_sd_rad, speed_sd, .. } = *self.settings;
+        let speed_sd_mps = speed_sd * self.workspace.robot.max_speed_mps;
+        let mut normal = |sd: f64| sd * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, rng);
+        let mut pushes = vec![Push::default(); horizon];
+        pushes.extend_from_slice(&self.mean);
+        for _ in 2..samples {
+            pushes.extend(self.mean.iter().map(|mean| Push {
+                bearing_rad: mean.bearing_rad + normal(bearing_sd_rad),
+                speed_mps: mean.speed_mps + normal(speed_sd_mps),
+            }));
+        }
+        pushes
+    }
+
+    /// The cost of `pushes` from `state`: seconds of the way that is left undone, and what it risked.
+    fn cost(&self, state: &RobotState, pushes: &[Push]) -> f64 {
+        let Self { workspace, settings, on_route: OnRoute { route, tracker, .. }, .. } = self;
+        let action_s = ActionSettings::default().action_s;
+        let (mut state, mut tracker) = (*state, *tracker);
+        let (begun_m, mut cost) = (tracker.arc_m, 0.0);
+        for (number, push) in pushes.iter().enumerate() {
+            let base = settings.base.waypoint(workspace, route, &tracker, &state);
+            let command = push.applied(&workspace.robot, base);
+            if !self.model.act(&mut state, command, |at| self.is_free(at, &mut cost)) {
+                // The later, the less certain.
+                return cost + settings.contact_cost / (1.0 + number as f64);
+            }
+            tracker.update(&route.guide, &state.pose);
+            cost += settings.cross_weight * action_s * tracker.cross_track_m * tracker.cross_track_m;
+            if is_at_end(&route.guide, &tracker) {
+                break;
+            }
+        }
+        let gained_s = (tracker.arc_m - begun_m) / workspace.robot.max_speed_mps;
+        cost - gained_s
+    }
+
+    /// Whether the model's robot may stand at `state`; adds what a time step there risks.
+    fn is_free(&self, state: &RobotState, cost: &mut f64) -> bool {
+        let MppiSettings { room_m, room_weight, .. } = *self.settings;
+        let robot = &self.workspace.robot;
+        let room = room_beside_m(self.workspace, &state.pose);
+        let lack = (1.0 - room / room_m).clamp(0.0, 1.0);
+        let pace = 0.3 + 0.7 * state.wheel_speed_mps / robot.max_speed_mps;
+        *cost += room_weight * lack * lack * pace * MODEL_DT_S;
+        self.workspace.checker.is_free(state.pose)
+    }
+}
+
+fn is_at_end(guide: &GuidePath, tracker: &Tracker) -> bool {
+    guide.length_m() - tracker.arc_m < 1e-6
+}
+
+/// Room beside nose, middle and tail of the robot, metres.
+fn room_beside_m(workspace: &Workspace, pose: &Pose) -> f64 {
+    let footprint = &workspace.robot.footprint;
+    let reach_m = (footprint.half_length_m() - footprint.half_width_m()).max(0.0);
+    let field = workspace.checker.field();
+    let at = |ahead_m: f64| field.sample(pose.to_world(Vector::new(ahead_m, 0.0)));
+    at(reach_m).min(at(0.0)).min(at(-reach_m)) - footprint.inscribed_radius_m()
+}
+
+/// The mean of the sequences in `samples`, each with weight exp(−(cost − least) / temperature).
+fn weighted_mean(samples: &[Push], costs: &[f64], settings: &MppiSettings) -> Vec<Push> {
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let weights: Vec<f64> = costs.iter().map(|cost| (-(cost - least) / settings.temperature).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    let mut mean = vec![Push::default(); settings.horizon];
+    for (pushes, weight) in samples.chunks(settings.horizon).zip(&weights) {
+        for (mean, push) in mean.iter_mut().zip(pushes) {
+            mean.bearing_rad += push.bearing_rad * weight / total;
+            mean.speed_mps += push.speed_mps * weight / total;
+        }
+    }
+    mean
+}
+
+/// A body that goes where its wheels roll, as fast as motors allow; no noise, no friction, no walls.
+#[derive(Clone, Debug)]
+struct Model {
+    robot: RobotModel,
+    controller: WaypointController,
+}
+
+impl Model {
+    fn new(robot: &RobotModel) -> Self {
+        let controller = WaypointController::new(robot, ActionSettings::default().action_s);
+        Self { robot: robot.clone(), controller }
+    }
+
+    /// Moves `state` by one action; false as soon as `is_free` denies a state on the way.
+    fn act(&self, state: &mut RobotState, waypoint: PolarWaypoint, mut is_free: impl FnMut(&RobotState) -> bool) -> bool {
+        let aim = self.controller.aim(&state.pose, waypoint.to_world(&state.pose), waypoint.speed_mps);
+        let steps = (ActionSettings::default().action_s / MODEL_DT_S).round() as usize;
+        (0..steps).all(|_| {
+            let command = self.controller.command(state, &aim);
+            self.follow(state, command);
+            is_free(state)
+        })
+    }
+
+    fn follow(&self, state: &mut RobotState, command: Command) {
+        let robot = &self.robot;
+        let (Command::Twist { speed_mps, .. } | Command::Steer { speed_mps, .. }) = command;
+        state.wheel_speed_mps = approach(state.wheel_speed_mps, speed_mps, robot.max_accel_mps2 * MODEL_DT_S);
+        let (turn_rad, slip_rad) = match (robot.drive, command) {
+            (Drive::Ackermann { steer_rate_radps, wheelbase_m, .. }, Command::Steer { steer_rad, .. }) => {
+                state.steer_rad = approach(state.steer_rad, steer_rad, steer_rate_radps * MODEL_DT_S);
+                let tan = state.steer_rad.tan();
+                (state.wheel_speed_mps * tan / wheelbase_m * MODEL_DT_S, (0.5 * tan).atan())
+            }
+            (_, Command::Twist { yaw_rate_radps, .. }) => {
+                let step = robot.max_yaw_accel_radps2 * MODEL_DT_S;
+                let wanted_radps = yaw_rate_radps * robot.yaw_gain();
+                state.yaw_rate_radps = approach(state.yaw_rate_radps, wanted_radps, step);
+                (state.yaw_rate_radps * MODEL_DT_S, 0.0)
+            }
+            (Drive::Differential { .. }, Command::Steer { .. }) => (0.0, 0.0),
+        };
+        let heading = state.pose.heading.radians();
+        let way = Heading::new(heading + slip_rad + 0.5 * turn_rad).unit() * (state.wheel_speed_mps * MODEL_DT_S);
+        state.pose = Pose::at(state.pose.position + way, Heading::new(heading + turn_rad));
+        state.velocity = Vector::new(state.wheel_speed_mps, 0.0);
+    }
+}
+
+fn approach(value: f64, target: f64, step: f64) -> f64 {
+    value + (target - value).clamp(-step, step)
+}

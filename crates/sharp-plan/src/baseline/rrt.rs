@@ -1,0 +1,145 @@
+//! RRT with replanning, executed open-loop: the planning baseline of Sec. 5.
+//!
+//! The robot is given the points of the planned path one after the other, each for the time that the
+//! plan allots, wherever it really is: feedback is the waypoint controller's alone. Where the path
+//! ends without the goal being reached, a new one is planned from there.
+
+use sharp_motion::{Outcome, Path, RrtSettings, Steering, Uniform, rrt};
+use sharp_sim::{ActionSettings, RobotState};
+use sharp_space::{CollisionChecker, Heading, Point, Pose, Seed};
+
+use crate::baseline::{Baseline, Pilot, Readiness, Situation, nominal_time_s};
+use crate::percept::Workspace;
+use crate::planner::Query;
+use crate::policy::PolarWaypoint;
+
+/// The baseline `rrt`: plans anew for each execution.
+#[derive(Clone, Debug)]
+pub struct Rrt<'a> {
+    /// Map and robot.
+    pub workspace: &'a Workspace,
+    /// The problem; the goal's heading is free.
+    pub query: Query,
+    /// Budget and steps of the planner.
+    pub settings: RrtSettings,
+    /// How its paths are executed.
+    pub following: RrtFollowing,
+    /// Root of the planner's random streams.
+    pub seed: Seed,
+}
+
+/// How a path is executed open-loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RrtFollowing {
+    /// Distance of the points that the robot is sent to, metres.
+    pub spacing_m: f64,
+}
+
+impl Default for RrtFollowing {
+    fn default() -> Self {
+        Self { spacing_m: 0.5 }
+    }
+}
+
+impl Baseline for Rrt<'_> {
+    fn pilot(&self, episode: u64) -> Box<dyn Pilot + '_> {
+        Box::new(RrtPilot { baseline: self, seed: self.seed.child("rrt", episode), plans: 0, hops: vec![], next: 0 })
+    }
+}
+
+/// A point of the path and for how many actions it is driven at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Hop {
+    point: Point,
+    actions: u32,
+}
+
+#[derive(Debug)]
+struct RrtPilot<'a> {
+    baseline: &'a Rrt<'a>,
+    seed: Seed,
+    plans: u64,
+    /// What is left of the path.
+    hops: Vec<Hop>,
+    /// The first of it.
+    next: usize,
+}
+
+impl Pilot for RrtPilot<'_> {
+    fn prepare(&mut self, situation: &Situation) -> Readiness {
+        if self.next < self.hops.len() && !situation.bumped {
+            return Readiness::Ready;
+        }
+        self.plan(situation.state.pose)
+    }
+
+    fn decide(&mut self, state: &RobotState) -> PolarWaypoint {
+        let hop = &mut self.hops[self.next];
+        let waypoint = PolarWaypoint::of(&state.pose, hop.point, self.baseline.workspace.robot.max_speed_mps);
+        hop.actions -= 1;
+        if hop.actions == 0 {
+            self.next += 1;
+        }
+        waypoint
+    }
+}
+
+impl RrtPilot<'_> {
+    fn plan(&mut self, start: Pose) -> Readiness {
+        let Rrt { workspace, query, settings, following, .. } = self.baseline;
+        let goal = fitting(workspace, query.goal);
+        let steering = Steering::of(workspace.robot.min_turning_radius_m());
+        let mut sampler = Uniform { bounds: workspace.grid.frame().bounds() };
+        let mut rng = self.seed.stream("plan", self.plans);
+        self.plans += 1;
+        let query = sharp_motion::Query { start, goal };
+        let Outcome::Solved(path) =
+            rrt(&query, &*workspace.checker, &steering, &mut sampler, settings, &mut rng)
+        else {
+            return Readiness::NoWay;
+        };
+        let nominal_time_s;
+        (self.hops, nominal_time_s) = hops(&path, workspace, following);
+        self.next = 0;
+        if self.hops.is_empty() { Readiness::NoWay } else { Readiness::Planned { nominal_time_s } }
+    }
+}
+
+/// `goal` with the nearest heading at which the robot fits there.
+fn fitting(workspace: &Workspace, goal: Pose) -> Pose {
+    let turned = |turn: f64| Pose::at(goal.position, Heading::new(goal.heading.radians() + turn));
+    let turns = (0..32).flat_map(|i| [f64::from(i) * 0.1, f64::from(i) * -0.1]);
+    turns.map(turned).find(|&pose| workspace.checker.is_free(pose)).unwrap_or(goal)
+}
+
+/// The points that the robot is sent to, and how long they take at half speed, seconds.
+fn hops(path: &Path, workspace: &Workspace, following: &RrtFollowing) -> (Vec<Hop>, f64) {
+    let action_s = ActionSettings::default().action_s;
+    let (mut hops, mut total_s) = (Vec::new(), 0.0);
+    let (mut travel_m, mut turn_rad) = (0.0, 0.0);
+    let mut hop = |point, travel_m: &mut f64, turn_rad: &mut f64| {
+        let time_s = nominal_time_s(workspace, *travel_m, *turn_rad);
+        hops.push(Hop { point, actions: (time_s / action_s - 1e-6).ceil().max(1.0) as u32 });
+        total_s += time_s;
+        (*travel_m, *turn_rad) = (0.0, 0.0);
+    };
+    for pair in path.poses().windows(2) {
+        let step_m = pair[0].distance_m(&pair[1]);
+        if step_m < 1e-9 {
+            // A corner: no point beyond it before the robot is there.
+            if travel_m > 0.0 {
+                hop(pair[0].position, &mut travel_m, &mut turn_rad);
+            }
+            turn_rad += pair[0].heading.turn_to(pair[1].heading).abs();
+        } else {
+            travel_m += step_m;
+            if travel_m >= following.spacing_m {
+                hop(pair[1].position, &mut travel_m, &mut turn_rad);
+            }
+        }
+    }
+    if travel_m > 0.0 {
+        hop(path.end().position, &mut travel_m, &mut turn_rad);
+    }
+    (hops, total_s)
+}
