@@ -8,6 +8,7 @@ use parry2d::shape::SharedShape;
 use sharp_space::{GridFrame, Heading, Pose, Vector};
 
 use crate::rectangles::CellRectangle;
+use crate::world::Wall;
 
 /// The walls of the map as one shape in the grid's frame.
 #[derive(Clone)]
@@ -39,6 +40,14 @@ impl Obstacles {
         });
         let shape = SharedShape::compound(border.into_iter().chain(walls).collect());
         Self { shape, origin: frame.origin }
+    }
+
+    pub(crate) fn walls(&self) -> impl Iterator<Item = Wall> {
+        let parts = self.shape.as_compound().expect("it was built as a compound").shapes();
+        parts.iter().map(|(pose, part)| {
+            let half_extents = part.as_cuboid().expect("its parts are boxes").half_extents;
+            Wall { center: our_vector(pose.translation), half_extents: our_vector(half_extents) }
+        })
     }
 
     pub(crate) fn shape(&self) -> SharedShape {

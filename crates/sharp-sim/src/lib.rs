@@ -20,6 +20,9 @@
 //! assert!(!report.contact && report.path_m > 0.1, "{report:?}");
 //! ```
 //!
+//! The feature `rigid3d` adds `RigidSim`, a body with four driven wheels on rapier3d, to check the
+//! others against; it is off by default, for it compiles a second engine.
+//!
 //! Everything random is keyed by (seed, episode, action): a clone of a vehicle is a fork that
 //! continues bit for bit as the original would.
 
@@ -30,6 +33,8 @@ mod kinematic;
 mod noise;
 mod planar;
 mod rectangles;
+#[cfg(feature = "rigid3d")]
+mod rigid;
 mod robot;
 mod simulator;
 mod state;
@@ -41,8 +46,10 @@ pub use controller::{Aim, WaypointController};
 pub use kinematic::KinematicSim;
 pub use noise::{ActionNoise, EpisodeNoise, NoiseError, NoiseModel, SlipperyPatches};
 pub use planar::PlanarSim;
+#[cfg(feature = "rigid3d")]
+pub use rigid::RigidSim;
 pub use robot::{Drive, RobotError, RobotModel};
 pub use simulator::{AnySim, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
 pub use state::{Command, RobotState};
 pub use vehicle::{ActionReport, ActionSettings, Vehicle, VehicleSnapshot};
-pub use world::World;
+pub use world::{Wall, World};

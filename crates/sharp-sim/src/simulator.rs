@@ -9,6 +9,8 @@ use thiserror::Error;
 
 use crate::kinematic::KinematicSim;
 use crate::planar::PlanarSim;
+#[cfg(feature = "rigid3d")]
+use crate::rigid::RigidSim;
 use crate::robot::RobotModel;
 use crate::state::{Command, RobotState};
 use crate::world::World;
@@ -40,12 +42,22 @@ pub enum SimulatorKind {
     Kinematic,
     /// [`PlanarSim`]: a rigid-body engine; the robot pushes against obstacles and grazes them.
     Planar,
+    /// [`RigidSim`]: wheels and gravity in three dimensions; the cross-check.
+    #[cfg(feature = "rigid3d")]
+    Rigid,
 }
 
-/// A name that belongs to no simulator.
+/// A name that belongs to no simulator of this build.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("simulator {0:?} is unknown, must be kinematic or planar (rapier2d)")]
-pub struct UnknownSimulator(String);
+#[non_exhaustive]
+pub enum UnknownSimulator {
+    /// There is none of that name.
+    #[error("simulator {0:?} is unknown, must be kinematic, planar (rapier2d) or rigid (rapier3d)")]
+    Name(String),
+    /// It was left out of this build.
+    #[error("simulator {0:?} is not compiled in; build with --features rigid3d")]
+    NotCompiled(String),
+}
 
 impl FromStr for SimulatorKind {
     type Err = UnknownSimulator;
@@ -54,7 +66,11 @@ impl FromStr for SimulatorKind {
         match name {
             "kinematic" => Ok(Self::Kinematic),
             "planar" | "rapier2d" => Ok(Self::Planar),
-            _ => Err(UnknownSimulator(name.to_owned())),
+            #[cfg(feature = "rigid3d")]
+            "rigid" | "rapier3d" => Ok(Self::Rigid),
+            #[cfg(not(feature = "rigid3d"))]
+            "rigid" | "rapier3d" => Err(UnknownSimulator::NotCompiled(name.to_owned())),
+            _ => Err(UnknownSimulator::Name(name.to_owned())),
         }
     }
 }
@@ -64,6 +80,8 @@ impl fmt::Display for SimulatorKind {
         f.write_str(match self {
             Self::Kinematic => "kinematic",
             Self::Planar => "planar",
+            #[cfg(feature = "rigid3d")]
+            Self::Rigid => "rigid",
         })
     }
 }
@@ -76,6 +94,9 @@ pub enum AnySim {
     Kinematic(KinematicSim),
     /// A rigid-body engine; boxed, for it is large.
     Planar(Box<PlanarSim>),
+    /// An engine with three dimensions; boxed, for it is large.
+    #[cfg(feature = "rigid3d")]
+    Rigid(Box<RigidSim>),
 }
 
 impl AnySim {
@@ -85,6 +106,8 @@ impl AnySim {
         match kind {
             SimulatorKind::Kinematic => Self::Kinematic(KinematicSim::new(world, robot)),
             SimulatorKind::Planar => Self::Planar(Box::new(PlanarSim::new(world, robot))),
+            #[cfg(feature = "rigid3d")]
+            SimulatorKind::Rigid => Self::Rigid(Box::new(RigidSim::new(world, robot))),
         }
     }
 }
@@ -94,6 +117,8 @@ impl Simulator for AnySim {
         match self {
             Self::Kinematic(sim) => sim.reset(state),
             Self::Planar(sim) => sim.reset(state),
+            #[cfg(feature = "rigid3d")]
+            Self::Rigid(sim) => sim.reset(state),
         }
     }
 
@@ -101,6 +126,8 @@ impl Simulator for AnySim {
         match self {
             Self::Kinematic(sim) => sim.step(command, dt_s),
             Self::Planar(sim) => sim.step(command, dt_s),
+            #[cfg(feature = "rigid3d")]
+            Self::Rigid(sim) => sim.step(command, dt_s),
         }
     }
 
@@ -108,6 +135,35 @@ impl Simulator for AnySim {
         match self {
             Self::Kinematic(sim) => sim.state(),
             Self::Planar(sim) => sim.state(),
+            #[cfg(feature = "rigid3d")]
+            Self::Rigid(sim) => sim.state(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simulators_are_known_by_their_names() {
+        for (name, expected) in [("kinematic", "kinematic"), ("planar", "planar"), ("rapier2d", "planar")] {
+            let kind = name.parse::<SimulatorKind>().map(|kind| kind.to_string());
+            assert_eq!(kind.as_deref(), Ok(expected), "{name}");
+        }
+        let error = "bullet".parse::<SimulatorKind>().map_err(|error| error.to_string());
+        let message =
+            "simulator \"bullet\" is unknown, must be kinematic, planar (rapier2d) or rigid (rapier3d)";
+        assert_eq!(error, Err(message.into()), "bullet");
+    }
+
+    #[test]
+    fn rapier3d_is_there_or_says_how_to_get_it() {
+        let found = "rapier3d".parse::<SimulatorKind>().map(|kind| kind.to_string());
+        let message = "simulator \"rapier3d\" is not compiled in; build with --features rigid3d";
+        match found.map_err(|error| error.to_string()) {
+            Ok(name) => assert_eq!((name.as_str(), cfg!(feature = "rigid3d")), ("rigid", true)),
+            Err(error) => assert_eq!((error.as_str(), cfg!(feature = "rigid3d")), (message, false)),
         }
     }
 }

@@ -9,7 +9,7 @@ use sharp_space::{Vector, wrap_angle};
 use crate::robot::{Drive, RobotModel};
 use crate::state::{Command, RobotState};
 
-const GRAVITY_MPS2: f64 = 9.81;
+pub(crate) const GRAVITY_MPS2: f64 = 9.81;
 
 /// The wheels of a robot.
 #[derive(Clone, Copy, Debug)]

@@ -5,6 +5,15 @@ use sharp_space::{DistanceField, Footprint, FootprintChecker, GridFrame, Occupan
 use crate::convert::Obstacles;
 use crate::rectangles::merge_blocked_cells;
 
+/// A block of wall, its sides parallel to the grid's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wall {
+    /// Its centre as seen from the grid's lower-left corner, metres.
+    pub center: Vector,
+    /// Half its length along the grid's rows and columns, metres.
+    pub half_extents: Vector,
+}
+
 /// The map around a robot of a given outline; shared by all simulators and their forks.
 #[derive(Clone, Debug)]
 pub struct World {
@@ -41,6 +50,12 @@ impl World {
     #[must_use]
     pub const fn field(&self) -> &DistanceField {
         self.checker.field()
+    }
+
+    /// Everything that blocks the robot as few boxes: the blocked cells, merged, and a border of one
+    /// metre around the grid.
+    pub fn walls(&self) -> impl Iterator<Item = Wall> {
+        self.obstacles.walls()
     }
 
     /// How far every point of the outline at `pose` can certainly move before it meets an obstacle,
