@@ -40,6 +40,8 @@ pub(crate) enum Command {
     /// Look at an option library.
     #[command(subcommand)]
     Library(Library),
+    /// Measure a system to compare with: RRT, tracking, MPPI or one flat policy.
+    Baseline(Baseline),
     /// Run a suite of problems and write results and tables.
     Eval(Eval),
     /// Print a completion script for a shell.
@@ -261,6 +263,69 @@ pub(crate) enum Library {
         /// The folder given to `--library`.
         dir: PathBuf,
     },
+}
+
+/// A system to compare with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Method {
+    /// The paper's: RRT, executed open-loop, planned anew from where it ended.
+    Rrt,
+    /// A drivable path, tracked in closed loop, planned anew on deviation.
+    Track,
+    /// Model-predictive path integral control along that path.
+    Mppi,
+    /// The paper's: one soft actor-critic policy from start to goal.
+    Sac,
+}
+
+impl Method {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Rrt => "rrt",
+            Self::Track => "track",
+            Self::Mppi => "mppi",
+            Self::Sac => "sac",
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Baseline {
+    /// The system.
+    #[arg(value_enum)]
+    pub(crate) method: Method,
+    #[command(flatten)]
+    pub(crate) map: MapArgs,
+    /// husky, limo or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    pub(crate) robot: String,
+    /// Initial configuration: metres, metres, radians in the map's frame.
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "goal")]
+    pub(crate) start: Option<String>,
+    /// Goal configuration; its heading is free.
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "start")]
+    pub(crate) goal: Option<String>,
+    /// One of a named map's own problems, instead of --start and --goal.
+    #[arg(long, value_name = "1..5", conflicts_with_all = ["start", "goal"])]
+    pub(crate) problem: Option<usize>,
+    /// Number of executions.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) episodes: u32,
+    /// none, nominal, harsh, biased or a noise file (.ron).
+    #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
+    pub(crate) noise: String,
+    /// The simulator.
+    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic")]
+    pub(crate) simulator: String,
+    /// What touching a wall means: the end of the episode, or a bump after which it goes on.
+    #[arg(long, value_enum, default_value_t = Collisions::End)]
+    pub(crate) collisions: Collisions,
+    /// Stop learning, or give up driving, after so many seconds of wall time [default: 2400].
+    #[arg(long, value_name = "S")]
+    pub(crate) time_limit: Option<f64>,
+    /// Environment steps that sac may learn from; unlike a time limit they give equal bytes.
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    pub(crate) max_env_steps: u64,
 }
 
 #[derive(Debug, Args)]

@@ -51,6 +51,7 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
         Command::Regions(command) => commands::regions::run(command, cli.seed, cli.json),
         Command::Map(command) => commands::map::run(command, cli.json),
         Command::Library(command) => commands::library::run(command, cli.json),
+        Command::Baseline(args) => commands::baseline::run(args, cli.seed, cli.json),
         Command::Eval(args) => commands::eval::run(args, cli.seed, cli.json),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "sharp", &mut std::io::stdout());

@@ -25,8 +25,8 @@ mod stats;
 mod task;
 
 pub use baseline::{
-    Baseline, ComparisonSettings, Driven, Host, Mppi, MppiSettings, Pilot, Readiness, Route, Rrt, RrtFollowing, Sac,
-    SacBudget, Situation, SpeedRule, Track, TrackSettings, compare, plan_route,
+    Baseline, ComparisonSettings, Driven, Host, Mppi, MppiSettings, Pilot, Readiness, Rrt, Sac, SacBudget,
+    Situation, SpeedRule, Track, TrackSettings, compare, plan_route,
 };
 pub use certify::{Certificate, Trial};
 pub use composed::{ComposedPolicy, Decision, Events};

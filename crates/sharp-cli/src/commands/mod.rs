@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub(crate) mod abstraction;
+pub(crate) mod baseline;
 pub(crate) mod eval;
 pub(crate) mod library;
 pub(crate) mod map;

@@ -12,7 +12,7 @@ use sharp_guide::GuidePath;
 use sharp_sim::{ActionSettings, Command, Drive, RobotModel, RobotState, WaypointController};
 use sharp_space::{CollisionChecker, Heading, Pose, Seed, Stream, Vector};
 
-use crate::baseline::route::{OnRoute, Route};
+use crate::baseline::route::OnRoute;
 use crate::baseline::track::TrackSettings;
 use crate::baseline::{Baseline, Pilot, Readiness, Situation};
 use crate::percept::{Tracker, Workspace};
@@ -74,7 +74,7 @@ pub struct Mppi<'a> {
     /// The problem.
     pub query: Query,
     /// The path of every episode's beginning.
-    pub route: Route,
+    pub route: GuidePath,
     /// Sampling and cost.
     pub settings: MppiSettings,
     /// Root of the perturbations.
@@ -180,9 +180,9 @@ impl MppiPilot<'_> {
                 // The later, the less certain.
                 return cost + settings.contact_cost / (1.0 + number as f64);
             }
-            tracker.update(&route.guide, &state.pose);
+            tracker.update(route, &state.pose);
             cost += settings.cross_weight * action_s * tracker.cross_track_m * tracker.cross_track_m;
-            if is_at_end(&route.guide, &tracker) {
+            if is_at_end(route, &tracker) {
                 break;
             }
         }

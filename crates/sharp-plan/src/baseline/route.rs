@@ -22,18 +22,11 @@ const STILL_TURN_RAD: f64 = 0.3;
 /// Actions between two plans: what a new path needs to show its worth.
 const PATIENCE_ACTIONS: u32 = 6;
 
-/// A path from a start to a goal.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Route {
-    /// The path.
-    pub guide: GuidePath,
-}
-
 /// A drivable path from `query`'s start to its goal's position, or `None` where there is none.
 #[must_use]
-pub fn plan_route(workspace: &Workspace, query: &Query) -> Option<Route> {
+pub fn plan_route(workspace: &Workspace, query: &Query) -> Option<GuidePath> {
     let steering = Steering::of(workspace.robot.min_turning_radius_m());
-    ridge(workspace, query, &steering).or_else(|| searched(workspace, query, &steering)).map(|guide| Route { guide })
+    ridge(workspace, query, &steering).or_else(|| searched(workspace, query, &steering))
 }
 
 fn ridge(workspace: &Workspace, query: &Query, steering: &Steering) -> Option<GuidePath> {
@@ -77,7 +70,7 @@ fn as_guide(path: &Path, steering: &Steering) -> Option<GuidePath> {
 pub(crate) struct OnRoute<'a> {
     workspace: &'a Workspace,
     query: Query,
-    pub(crate) route: Route,
+    pub(crate) route: GuidePath,
     pub(crate) tracker: Tracker,
     /// Where the robot last moved, and the actions since.
     anchor: (Pose, u32),
@@ -86,8 +79,8 @@ pub(crate) struct OnRoute<'a> {
 }
 
 impl<'a> OnRoute<'a> {
-    pub(crate) fn new(workspace: &'a Workspace, query: Query, route: Route) -> Self {
-        let tracker = Tracker::start(&route.guide, &query.start);
+    pub(crate) fn new(workspace: &'a Workspace, query: Query, route: GuidePath) -> Self {
+        let tracker = Tracker::start(&route, &query.start);
         Self { workspace, query, route, tracker, anchor: (query.start, 0), actions: None }
     }
 
@@ -98,7 +91,7 @@ impl<'a> OnRoute<'a> {
             self.actions = Some(0);
             return self.planned();
         };
-        self.tracker.update(&self.route.guide, &state.pose);
+        self.tracker.update(&self.route, &state.pose);
         self.watch(state);
         self.actions = Some(actions + 1);
         let is_off = self.tracker.cross_track_m.abs() > OFF_ROUTE_M
@@ -111,7 +104,7 @@ impl<'a> OnRoute<'a> {
         match plan_route(self.workspace, &query) {
             Some(route) => {
                 self.route = route;
-                self.tracker = Tracker::start(&self.route.guide, &state.pose);
+                self.tracker = Tracker::start(&self.route, &state.pose);
                 (self.anchor, self.actions) = ((state.pose, 0), Some(0));
                 self.planned()
             }
@@ -124,7 +117,7 @@ impl<'a> OnRoute<'a> {
     }
 
     fn planned(&self) -> Readiness {
-        Readiness::Planned { nominal_time_s: nominal_time_s(self.workspace, self.route.guide.length_m(), 0.0) }
+        Readiness::Planned { nominal_time_s: nominal_time_s(self.workspace, self.route.length_m(), 0.0) }
     }
 
     fn watch(&mut self, state: &RobotState) {

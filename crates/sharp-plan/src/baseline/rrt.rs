@@ -13,6 +13,9 @@ use crate::percept::Workspace;
 use crate::planner::Query;
 use crate::policy::PolarWaypoint;
 
+/// Distance of the points that the robot is sent to, metres: the farthest that an action may aim at.
+const SPACING_M: f64 = 0.5;
+
 /// The baseline `rrt`: plans anew for each execution.
 #[derive(Clone, Debug)]
 pub struct Rrt<'a> {
@@ -22,23 +25,8 @@ pub struct Rrt<'a> {
     pub query: Query,
     /// Budget and steps of the planner.
     pub settings: RrtSettings,
-    /// How its paths are executed.
-    pub following: RrtFollowing,
     /// Root of the planner's random streams.
     pub seed: Seed,
-}
-
-/// How a path is executed open-loop.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RrtFollowing {
-    /// Distance of the points that the robot is sent to, metres.
-    pub spacing_m: f64,
-}
-
-impl Default for RrtFollowing {
-    fn default() -> Self {
-        Self { spacing_m: 0.5 }
-    }
 }
 
 impl Baseline for Rrt<'_> {
@@ -86,7 +74,7 @@ impl Pilot for RrtPilot<'_> {
 
 impl RrtPilot<'_> {
     fn plan(&mut self, start: Pose) -> Readiness {
-        let Rrt { workspace, query, settings, following, .. } = self.baseline;
+        let Rrt { workspace, query, settings, .. } = self.baseline;
         let goal = fitting(workspace, query.goal);
         let steering = Steering::of(workspace.robot.min_turning_radius_m());
         let mut sampler = Uniform { bounds: workspace.grid.frame().bounds() };
@@ -99,7 +87,7 @@ impl RrtPilot<'_> {
             return Readiness::NoWay;
         };
         let nominal_time_s;
-        (self.hops, nominal_time_s) = hops(&path, workspace, following);
+        (self.hops, nominal_time_s) = hops(&path, workspace);
         self.next = 0;
         if self.hops.is_empty() { Readiness::NoWay } else { Readiness::Planned { nominal_time_s } }
     }
@@ -113,7 +101,7 @@ fn fitting(workspace: &Workspace, goal: Pose) -> Pose {
 }
 
 /// The points that the robot is sent to, and how long they take at half speed, seconds.
-fn hops(path: &Path, workspace: &Workspace, following: &RrtFollowing) -> (Vec<Hop>, f64) {
+fn hops(path: &Path, workspace: &Workspace) -> (Vec<Hop>, f64) {
     let action_s = ActionSettings::default().action_s;
     let (mut hops, mut total_s) = (Vec::new(), 0.0);
     let (mut travel_m, mut turn_rad) = (0.0, 0.0);
@@ -133,7 +121,7 @@ fn hops(path: &Path, workspace: &Workspace, following: &RrtFollowing) -> (Vec<Ho
             turn_rad += pair[0].heading.turn_to(pair[1].heading).abs();
         } else {
             travel_m += step_m;
-            if travel_m >= following.spacing_m {
+            if travel_m >= SPACING_M {
                 hop(pair[1].position, &mut travel_m, &mut turn_rad);
             }
         }

@@ -3,11 +3,12 @@
 //! A [`Follower`] steers; a [`SpeedRule`] slows it down where room is scarce, before bends and while
 //! the robot is off its line. The route is planned anew when the robot leaves it or stands still.
 
+use sharp_guide::GuidePath;
 use serde::{Deserialize, Serialize};
 use sharp_sim::{RobotModel, RobotState};
 use sharp_space::Heading;
 
-use crate::baseline::route::{OnRoute, Route};
+use crate::baseline::route::OnRoute;
 use crate::baseline::{Baseline, Pilot, Readiness, Situation};
 use crate::percept::{Tracker, Workspace};
 use crate::planner::Query;
@@ -33,9 +34,9 @@ pub struct SpeedRule {
 impl SpeedRule {
     /// The speed for a robot at `state`, metres per second.
     #[must_use]
-    pub fn speed_mps(&self, workspace: &Workspace, route: &Route, tracker: &Tracker, state: &RobotState) -> f64 {
+    pub fn speed_mps(&self, workspace: &Workspace, route: &GuidePath, tracker: &Tracker, state: &RobotState) -> f64 {
         let robot = &workspace.robot;
-        let view = GuideView { guide: &route.guide, next: None };
+        let view = GuideView { guide: route, next: None };
         let half_width_m = robot.footprint.inscribed_radius_m();
         let steps = (self.ahead_m / LOOK_STEP_M).ceil() as usize;
         let (mut room_m, mut turn_rad) = (f64::INFINITY, 0.0);
@@ -96,12 +97,12 @@ impl TrackSettings {
     pub fn waypoint(
         &self,
         workspace: &Workspace,
-        route: &Route,
+        route: &GuidePath,
         tracker: &Tracker,
         state: &RobotState,
     ) -> PolarWaypoint {
         let speed_mps = self.speed.speed_mps(workspace, route, tracker, state);
-        let view = GuideView { guide: &route.guide, next: None };
+        let view = GuideView { guide: route, next: None };
         Follower { rule: self.rule, speed_mps }.waypoint(&workspace.robot, &state.pose, tracker, &view)
     }
 }
@@ -114,7 +115,7 @@ pub struct Track<'a> {
     /// The problem.
     pub query: Query,
     /// The path of every episode's beginning.
-    pub route: Route,
+    pub route: GuidePath,
     /// How it is tracked.
     pub settings: TrackSettings,
 }

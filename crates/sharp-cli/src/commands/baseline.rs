@@ -1,0 +1,263 @@
+//! `sharp baseline`: the systems to compare with, on the same map, robot, noise and simulator.
+
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use sharp_motion::{Budget, RrtSettings};
+use sharp_plan::{
+    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, Query, Rrt, Sac, SacBudget,
+    Tally, Track, TrackSettings, Workspace, compare, plan_route,
+};
+use sharp_sim::{NoiseModel, SimulatorKind};
+use sharp_space::Seed;
+
+use crate::args::{Baseline, Collisions, Method};
+use crate::outcome::{Exit, Failure, say, to_json};
+use crate::progress::{Stopwatch, is_interrupted, spinner};
+use crate::report::{DecisionTimes, MapReport};
+use crate::input;
+
+/// Samples of one RRT plan: enough for 75 m; one that finds nothing has failed.
+const RRT_ITERATIONS: usize = 400_000;
+/// Wall time that the paper gives its baselines, seconds.
+const TIME_LIMIT_S: f64 = 2400.0;
+/// Longest crossing of a flat policy where no path tells, simulated seconds.
+const HORIZON_S: f64 = 300.0;
+
+/// Wall time by phase, seconds. `plan` and `learn` are what one execution needs before and while it
+/// drives; `drive` is what simulating all of them took, their planning included.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct BaselineTimes {
+    load: f64,
+    plan: f64,
+    learn: f64,
+    drive: f64,
+    total: f64,
+}
+
+/// `sharp.baseline/1`.
+#[derive(Debug, Serialize)]
+struct BaselineReport {
+    schema: &'static str,
+    method: &'static str,
+    status: &'static str,
+    robot: String,
+    noise: String,
+    simulator: String,
+    seed: u64,
+    map: MapReport,
+    episodes: u32,
+    successes: u32,
+    success_rate: f64,
+    lower95: f64,
+    upper95: f64,
+    collisions: u32,
+    timeouts: u32,
+    strays: u32,
+    recoveries: u32,
+    mean_sim_time_s: f64,
+    mean_path_m: f64,
+    env_steps: u64,
+    gradient_steps: u64,
+    decision_us: DecisionTimes,
+    time_s: BaselineTimes,
+}
+
+/// The problem with everything around it.
+struct Bench<'a> {
+    args: &'a Baseline,
+    workspace: Workspace,
+    query: Query,
+    settings: ComparisonSettings,
+    seed: Seed,
+}
+
+/// What preparing and driving gave.
+#[derive(Default)]
+struct Measured {
+    driven: Vec<Driven>,
+    env_steps: u64,
+    gradient_steps: u64,
+}
+
+pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let mut stopwatch = Stopwatch::start();
+    stopwatch.enter("load");
+    let limit_s = args.time_limit.unwrap_or(TIME_LIMIT_S);
+    let limit = Duration::try_from_secs_f64(limit_s)
+        .map_err(|_| Failure::new("USAGE", format!("--time-limit is {limit_s}, expected a number of seconds from 0 on")))?;
+    let deadline = Instant::now().checked_add(limit);
+    let map = input::map(&args.map)?;
+    let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
+    let noise = input::noise(&args.noise)?;
+    let workspace = Workspace::new(map.grid.clone(), input::robot(&args.robot)?);
+    input::check_query(&workspace, &query)?;
+    let settings = comparison(args, noise, seed)?;
+    let bench = Bench { args, workspace, query, settings, seed: Seed(seed).child("baseline", 0) };
+
+    let bar = spinner(args.method.name());
+    let stop = || is_interrupted() || deadline.is_some_and(|deadline| Instant::now() >= deadline);
+    let measured = bench.measure(&mut stopwatch, &stop)?;
+    bar.finish_and_clear();
+    let report = bench.report(seed, MapReport::new(&map.name, &map.grid), measured.as_ref(), &stopwatch);
+    if json {
+        say!("{}", to_json(&report));
+    } else {
+        print_report(&report);
+    }
+    Ok(match measured {
+        _ if is_interrupted() => Exit::Interrupted,
+        Some(_) => Exit::Done,
+        None => Exit::No,
+    })
+}
+
+fn comparison(args: &Baseline, noise: NoiseModel, seed: u64) -> Result<ComparisonSettings, Failure> {
+    let simulator = args
+        .simulator
+        .parse::<SimulatorKind>()
+        .map_err(|error| Failure::new("USAGE", format!("--simulator: {error}")))?;
+    Ok(ComparisonSettings {
+        episodes: args.episodes,
+        simulator,
+        noise,
+        contact_ends: args.collisions == Collisions::End,
+        // The noise of `sharp run --seed`: what is compared meets the same luck.
+        seed: Seed(seed),
+    })
+}
+
+impl Bench<'_> {
+    /// Prepares the system and lets it drive; `None` if no path leads to the goal.
+    fn measure(&self, stopwatch: &mut Stopwatch, stop: &(dyn Fn() -> bool + Sync)) -> Result<Option<Measured>, Failure> {
+        let Self { args, workspace, query, seed, .. } = self;
+        if args.method == Method::Rrt {
+            let settings = RrtSettings { budget: Budget { iterations: RRT_ITERATIONS }, ..RrtSettings::default() };
+            return Ok(Some(self.drive(&Rrt { workspace, query: *query, settings, seed: *seed }, stopwatch, stop)));
+        }
+        stopwatch.enter("plan");
+        let route = plan_route(workspace, query);
+        stopwatch.stop();
+        if args.method == Method::Sac {
+            let length_s = route.map(|route| 6.0 * route.length_m() / workspace.robot.max_speed_mps);
+            return self.learn(length_s.unwrap_or(HORIZON_S).max(60.0), stopwatch, stop).map(Some);
+        }
+        let Some(route) = route else { return Ok(None) };
+        let robot = &workspace.robot;
+        Ok(Some(if args.method == Method::Track {
+            self.drive(&Track { workspace, query: *query, route, settings: TrackSettings::new(robot) }, stopwatch, stop)
+        } else {
+            let settings = MppiSettings::new(robot);
+            self.drive(&Mppi { workspace, query: *query, route, settings, seed: *seed }, stopwatch, stop)
+        }))
+    }
+
+    fn learn(
+        &self,
+        horizon_s: f64,
+        stopwatch: &mut Stopwatch,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Measured, Failure> {
+        stopwatch.enter("learn");
+        let budget = SacBudget { max_env_steps: self.args.max_env_steps, horizon_s };
+        let learnt = Sac::learn(&self.workspace, self.query, (&self.settings.noise, self.seed), budget, stop)
+            .map_err(|error| Failure::from(anyhow::Error::from(error)))?;
+        // The limit is for learning: what was learnt is driven in any case.
+        let driven = self.drive(&learnt, stopwatch, &is_interrupted);
+        Ok(Measured { env_steps: learnt.env_steps(), gradient_steps: learnt.gradient_steps(), ..driven })
+    }
+
+    fn drive(&self, system: &dyn System, stopwatch: &mut Stopwatch, stop: &(dyn Fn() -> bool + Sync)) -> Measured {
+        stopwatch.enter("drive");
+        let begun = Instant::now();
+        let clock_us = || begun.elapsed().as_secs_f64() * 1e6;
+        let host = Host { clock_us: &clock_us, stop };
+        let driven = compare(system, &self.workspace, &self.query, &self.settings, &host);
+        stopwatch.stop();
+        Measured { driven, ..Measured::default() }
+    }
+
+    fn report(&self, seed: u64, map: MapReport, measured: Option<&Measured>, watch: &Stopwatch) -> BaselineReport {
+        let nothing = Measured::default();
+        let Measured { driven, env_steps, gradient_steps } = measured.unwrap_or(&nothing);
+        let ended = |end: EpisodeEnd| driven.iter().filter(|one| one.episode.end == end).count() as u32;
+        let tally = Tally { episodes: self.args.episodes, successes: ended(EpisodeEnd::Reached) };
+        let mean = |of: fn(&Driven) -> f64| {
+            let reached = driven.iter().filter(|one| one.episode.end == EpisodeEnd::Reached);
+            reached.map(of).fold(0.0, |sum, value| sum + value) / f64::from(tally.successes.max(1))
+        };
+        let planning_us = driven.iter().map(|one| one.plan_us).sum::<f64>() / driven.len().max(1) as f64;
+        BaselineReport {
+            schema: "sharp.baseline/1",
+            method: self.args.method.name(),
+            status: if measured.is_some() { "driven" } else { "no_plan" },
+            robot: self.workspace.robot.name.clone(),
+            noise: self.args.noise.clone(),
+            simulator: self.settings.simulator.to_string(),
+            seed,
+            map,
+            episodes: tally.episodes,
+            successes: tally.successes,
+            success_rate: tally.rate(),
+            lower95: tally.lower95(),
+            upper95: tally.upper95(),
+            collisions: driven.iter().map(|one| one.episode.contacts).sum(),
+            timeouts: ended(EpisodeEnd::TimedOut) + ended(EpisodeEnd::Lost),
+            strays: driven.iter().map(|one| one.episode.events.strays).sum(),
+            recoveries: driven.iter().map(|one| one.episode.events.recoveries).sum(),
+            mean_sim_time_s: mean(|one| one.episode.time_s),
+            mean_path_m: mean(|one| one.episode.path_m),
+            env_steps: *env_steps,
+            gradient_steps: *gradient_steps,
+            decision_us: decision_times(driven),
+            time_s: BaselineTimes {
+                load: watch.spent_s("load"),
+                plan: watch.spent_s("plan") + 1e-6 * planning_us,
+                learn: watch.spent_s("learn"),
+                drive: watch.spent_s("drive"),
+                total: watch.total_s(),
+            },
+        }
+    }
+}
+
+fn decision_times(driven: &[Driven]) -> DecisionTimes {
+    let mut times: Vec<f64> = driven.iter().flat_map(|one| one.episode.decisions_us.iter().copied()).collect();
+    times.sort_by(f64::total_cmp);
+    let quantile = |q: f64| {
+        let last = times.len().saturating_sub(1);
+        times.get(((times.len() as f64 * q) as usize).min(last)).copied().unwrap_or(0.0)
+    };
+    DecisionTimes { p50: quantile(0.5), p99: quantile(0.99) }
+}
+
+fn print_report(report: &BaselineReport) {
+    if report.status == "no_plan" {
+        say!("{}: no path leads to the goal", report.method);
+        return;
+    }
+    say!(
+        "{}: {} of {} reached the goal ({:.1} %, between {:.1} and {:.1} %)",
+        report.method,
+        report.successes,
+        report.episodes,
+        100.0 * report.success_rate,
+        100.0 * report.lower95,
+        100.0 * report.upper95
+    );
+    say!(
+        "{} collisions, {} out of time, {} new plans on the way; {:.1} s and {:.1} m on average; a decision takes {:.1} us (p99 {:.1})",
+        report.collisions,
+        report.timeouts,
+        report.recoveries,
+        report.mean_sim_time_s,
+        report.mean_path_m,
+        report.decision_us.p50,
+        report.decision_us.p99
+    );
+    let BaselineTimes { plan, learn, drive, total, .. } = report.time_s;
+    say!(
+        "took {total:.1} s: planning {plan:.2} an execution, learning {learn:.1} ({} steps), all executions {drive:.1}",
+        report.env_steps
+    );
+}
