@@ -8,6 +8,7 @@
 mod bench;
 mod ci;
 mod eval;
+mod peers;
 mod process;
 mod stats;
 mod tidy;
@@ -27,7 +28,9 @@ usage: cargo xtask COMMAND
   train-regions [ARGS]   sharp regions train ARGS, on the ndarray device by default
   eval [--profile smoke|quick|paper] [ARGS]
                          sharp eval of that suite
-  bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion";
+  bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
+  bench peers [sim]      the same work here and in other programs, as JSON lines
+                         [--rounds N] [--seconds S] [--map M]";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -44,6 +47,7 @@ fn main() -> ExitCode {
         }),
         "train-regions" => train_regions::run(rest),
         "eval" => eval::run(rest),
+        "bench" if rest.first().is_some_and(|word| word == "peers") => peers::run(&rest[1..]),
         "bench" => bench::run(rest),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");

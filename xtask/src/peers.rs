@@ -1,0 +1,216 @@
+//! `cargo xtask bench peers`: the same work here and in other programs, by turns in one run.
+//!
+//! Turns make the ratios hold on a machine that others share: what slows one side down slows the
+//! other down too. Each line on stdout is a JSON object of the schema `sharp.peer/1` with medians
+//! over the rounds.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, bail, ensure};
+use serde_json::{Value, json};
+
+use crate::process::{cargo, flag};
+use crate::tree::root;
+
+const MAPS: [&str; 4] = ["grid_15", "grid_75", "boxes_100", "boxes_10000"];
+/// Our simulators, the beginning of their lines and the layouts of the peer they stand against.
+const OURS: [(&str, &str, &[&str]); 3] = [
+    ("rapier2d", "sim", &["mesh", "bodies"]),
+    ("rapier3d", "sim.rigid3d", &["mesh"]),
+    ("kinematic", "sim.kinematic", &["mesh"]),
+];
+/// How the peer holds the walls: all in one concave mesh, or each as a body.
+const LAYOUTS: [&str; 2] = ["mesh", "bodies"];
+/// What both sides report, each a rate per second.
+const QUANTITIES: [&str; 3] = ["steps", "actions", "idle"];
+
+/// Compares with the peers of the suite that the first argument names; `--rounds N` and `--seconds S`
+/// set how often and how long each side works, `--map M` picks one map.
+///
+/// # Errors
+/// Returns an error if the suite or a flag is unknown, or if a side cannot be built or run.
+pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
+    let suite = args.first().map_or("sim", String::as_str);
+    ensure!(suite == "sim" || suite.starts_with('-'), "no comparison is called {suite:?}, there is sim");
+    let rounds: usize = flag(args, "--rounds").unwrap_or("3").parse().context("--rounds")?;
+    ensure!(rounds > 0, "--rounds is 0, must be at least 1");
+    let seconds: f64 = flag(args, "--seconds").unwrap_or("3").parse().context("--seconds")?;
+    let maps: Vec<&str> = match flag(args, "--map") {
+        None => MAPS.to_vec(),
+        Some(map) if MAPS.contains(&map) => vec![map],
+        Some(map) => bail!("no map is called {map:?}, there are {}", MAPS.join(", ")),
+    };
+    let sides = Sides::prepare(seconds.to_string())?;
+    for map in maps {
+        for line in sides.compare(map, rounds)? {
+            if writeln!(std::io::stdout(), "{line}").is_err() {
+                // Whoever reads has read enough.
+                return Ok(0);
+            }
+        }
+    }
+    Ok(0)
+}
+
+/// Both sides, ready to run.
+struct Sides {
+    python: PathBuf,
+    /// How long each measurement takes, as both sides read it.
+    seconds: String,
+}
+
+impl Sides {
+    fn prepare(seconds: String) -> anyhow::Result<Self> {
+        succeed(cargo(&["build", "--release"]).args(EXAMPLE))?;
+        Ok(Self { python: python()?, seconds })
+    }
+
+    /// Measures every simulator and layout on `map`, by turns.
+    fn compare(&self, map: &str, rounds: usize) -> anyhow::Result<Vec<Value>> {
+        let walls = folder().join("walls.json");
+        fs::write(&walls, example(&[map, "walls"])?)
+            .with_context(|| format!("cannot write {}", walls.display()))?;
+        let mut ours = vec![Vec::new(); OURS.len()];
+        let mut peers = vec![Vec::new(); LAYOUTS.len()];
+        for round in 1..=rounds {
+            eprintln!("{map}: round {round} of {rounds}, load {}", load());
+            for ((simulator, ..), results) in OURS.iter().zip(&mut ours) {
+                results.push(parse(&example(&[map, simulator, &self.seconds])?)?);
+            }
+            for (layout, results) in LAYOUTS.iter().zip(&mut peers) {
+                results.push(self.peer(&walls, layout)?);
+            }
+        }
+        let mut lines = Vec::new();
+        for ((simulator, prefix, layouts), ours) in OURS.iter().zip(&ours) {
+            for (layout, peer) in LAYOUTS.iter().zip(&peers).filter(|(layout, _)| layouts.contains(layout)) {
+                for quantity in QUANTITIES {
+                    let mut line = line(&format!("{prefix}.{quantity}.{layout}"), quantity, ours, peer)?;
+                    line["map"] = json!(map);
+                    line["ours_name"] = json!(simulator);
+                    lines.push(line);
+                }
+            }
+        }
+        Ok(lines)
+    }
+
+    /// One measurement of the peer, which says much else on stdout.
+    fn peer(&self, walls: &Path, layout: &str) -> anyhow::Result<Value> {
+        let result = folder().join("result.json");
+        let mut command = Command::new(&self.python);
+        command.arg(root().join("assets/peers/pybullet_husky.py")).arg(walls);
+        command.args([layout, &self.seconds]).arg(&result);
+        succeed(command.stdout(Stdio::null()))?;
+        parse(&fs::read_to_string(&result).with_context(|| format!("cannot read {}", result.display()))?)
+    }
+}
+
+/// The line about `quantity`: medians of both sides and their ratio.
+fn line(what: &str, quantity: &str, ours: &[Value], peers: &[Value]) -> anyhow::Result<Value> {
+    let rate = |results: &[Value]| {
+        let rates: Option<Vec<f64>> = results.iter().map(|result| result[quantity].as_f64()).collect();
+        median(rates.with_context(|| format!("{what}: a side reports no {quantity}"))?)
+            .with_context(|| format!("{what}: nothing was measured"))
+    };
+    let (ours, peer) = (rate(ours)?, rate(peers)?);
+    Ok(json!({
+        "schema": "sharp.peer/1", "what": what, "ours": ours, "peer": peer, "ratio": ours / peer,
+        "peer_name": peers[0]["name"], "rounds": peers.len(),
+    }))
+}
+
+/// The middle value; of an even number the lower one.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len().checked_sub(1)? / 2).copied()
+}
+
+const EXAMPLE: [&str; 6] = ["--package", "sharp-sim", "--features", "rigid3d", "--example", "peer_sim"];
+
+/// What our side prints when called with `args`.
+fn example(args: &[&str]) -> anyhow::Result<String> {
+    let mut command = cargo(&["run", "--quiet", "--release"]);
+    command.args(EXAMPLE).arg("--").args(args).stderr(Stdio::inherit());
+    let output = command.output().context("cannot start cargo")?;
+    ensure!(output.status.success(), "peer_sim {} failed", args.join(" "));
+    String::from_utf8(output.stdout).context("peer_sim prints no text")
+}
+
+fn parse(text: &str) -> anyhow::Result<Value> {
+    serde_json::from_str(text).with_context(|| format!("{text:?} is no JSON"))
+}
+
+/// Where the virtual environment and the files between the sides lie.
+fn folder() -> PathBuf {
+    root().join("target/peers")
+}
+
+/// The interpreter of a virtual environment with the peers' packages, made on the first call.
+fn python() -> anyhow::Result<PathBuf> {
+    let python = folder().join("bin/python");
+    if !python.exists() {
+        succeed(Command::new("python3").args(["-m", "venv"]).arg(folder()))?;
+    }
+    let mut install = Command::new(&python);
+    install.args(["-m", "pip", "install", "--quiet", "--requirement"]);
+    succeed(install.arg(root().join("assets/peers/requirements.txt")))?;
+    Ok(python)
+}
+
+/// Runs `command`; stdout is ours alone, so what it says there goes nowhere.
+fn succeed(command: &mut Command) -> anyhow::Result<()> {
+    let program = command.get_program().to_owned();
+    let status = command.stdout(Stdio::null()).status();
+    let status = status.with_context(|| format!("cannot start {}", program.display()))?;
+    ensure!(status.success(), "{} failed: {status}", program.display());
+    Ok(())
+}
+
+/// How busy the machine is: the mean number of running processes over the last minute.
+fn load() -> String {
+    let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    text.split(' ').next().filter(|word| !word.is_empty()).unwrap_or("unknown").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_holds_medians_and_their_ratio() {
+        let results = |name: &str, rates: [f64; 3]| rates.map(|rate| json!({"name": name, "steps": rate}));
+        let (ours, peers) = (results("ours", [9.0, 80.0, 10.0]), results("bullet 3", [2.0, 1.0, 4.0]));
+        let line = line("sim.steps.mesh", "steps", &ours, &peers).expect("all is there");
+        assert_eq!(
+            line,
+            json!({
+                "schema": "sharp.peer/1", "what": "sim.steps.mesh", "ours": 10.0, "peer": 2.0, "ratio": 5.0,
+                "peer_name": "bullet 3", "rounds": 3,
+            })
+        );
+    }
+
+    #[test]
+    fn a_side_without_a_rate_is_named() {
+        let error = line("sim.idle.mesh", "idle", &[json!({})], &[json!({"idle": 1.0})]);
+        let message = error.expect_err("ours is empty").to_string();
+        assert_eq!(message, "sim.idle.mesh: a side reports no idle");
+    }
+
+    #[test]
+    fn unknown_suites_and_maps_are_refused_before_anything_is_built() {
+        for (args, expected) in [
+            (vec!["cooking"], "no comparison is called \"cooking\", there is sim"),
+            (vec!["sim", "--map", "moon"], "no map is called \"moon\", there are grid_15, grid_75"),
+            (vec!["--rounds", "0"], "--rounds is 0, must be at least 1"),
+        ] {
+            let args: Vec<String> = args.into_iter().map(String::from).collect();
+            let error = run(&args).expect_err("refused").to_string();
+            assert!(error.starts_with(expected), "{args:?}: {error}");
+        }
+    }
+}
