@@ -1,2 +1,6 @@
-//! One binary of integration tests.
+//! One binary of integration tests: it links once.
+mod determinism;
+mod learning;
 mod maps;
+mod paper;
+mod worlds;
