@@ -23,6 +23,9 @@ use crate::sharp::{Monitor, Phase};
 /// Legs whose ends are further apart than this cross their interfaces at right angles, metres.
 const CROSSING_M: f64 = 1.2;
 
+/// A car turns no further than this in its stride, however much room it has: 120 degrees.
+const CAR_TURN_MAX_RAD: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
+
 /// The abstraction of one map for one robot: Φ, Ψ and O.
 #[derive(Clone, Debug)]
 pub struct Abstraction {
@@ -42,7 +45,7 @@ pub struct SearchSettings {
     /// Seconds added to a first or last leg that passes a centroid by: no later problem can reuse it,
     /// and the paper knows no such leg.
     pub shortcut_surcharge_s: f64,
-    /// Largest turn between two guides that a robot takes in its stride, radians.
+    /// Largest turn between two guides that a robot which turns in place takes in its stride, radians.
     pub smooth_turn_rad: f64,
     /// How guides are planned.
     pub guide: GuideSettings,
@@ -183,13 +186,28 @@ impl<'a> Planner<'a> {
         let turn = first.guide.end().heading.turn_to(second.guide.start().heading).abs();
         let robot = &self.workspace.robot;
         let turn_s = turn / (robot.max_yaw_rate_radps * robot.yaw_gain());
-        if turn <= self.settings.smooth_turn_rad {
+        let room_m = self.workspace.checker.field().sample(after.start);
+        if turn <= self.in_stride_rad(room_m) {
             return turn_s;
         }
-        // Room for the whole circle and for arriving off the centre.
-        let room_m = self.workspace.checker.field().sample(after.start);
-        let spins = robot.can_turn_in_place() && room_m > robot.footprint.circumscribed_radius_m() + 0.3;
-        if spins { turn_s + 2.0 } else { f64::INFINITY }
+        // Room for the whole circle, or for a car's loop, and for arriving off the centre.
+        let radius_m = robot.min_turning_radius_m();
+        let circle_m = 2.0 * radius_m + robot.footprint.circumscribed_radius_m() + 0.3;
+        let loop_s = 2.0 + std::f64::consts::TAU * radius_m / self.settings.nominal_speed_mps;
+        if room_m > circle_m { turn_s + loop_s } else { f64::INFINITY }
+    }
+
+    /// The largest turn between two guides that the robot takes in its stride with `room_m` around it.
+    ///
+    /// A car rounds the corner of two lines on a circle that touches them radius x tan(turn / 2)
+    /// before and behind it; the outline of a robot that turns in place swings out instead.
+    fn in_stride_rad(&self, room_m: f64) -> f64 {
+        let robot = &self.workspace.robot;
+        if robot.can_turn_in_place() {
+            return self.settings.smooth_turn_rad;
+        }
+        let run_up_m = (room_m - robot.footprint.inscribed_radius_m()).max(0.0);
+        (2.0 * (run_up_m / robot.min_turning_radius_m()).atan()).min(CAR_TURN_MAX_RAD)
     }
 
     fn guide(&self, id: LegId) -> Result<Arc<Leg>, NoGuide> {

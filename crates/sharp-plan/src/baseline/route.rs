@@ -19,14 +19,23 @@ const STILL_ACTIONS: u32 = 6;
 /// A robot that moved less than this and turned less than [`STILL_TURN_RAD`] stands still, metres.
 const STILL_M: f64 = 0.15;
 const STILL_TURN_RAD: f64 = 0.3;
+/// Turning radii that routes are planned with, in units of the robot's own.
+const SPARE_RADII: [f64; 3] = [1.5, 1.25, 1.0];
 /// Actions between two plans: what a new path needs to show its worth.
 const PATIENCE_ACTIONS: u32 = 6;
 
 /// A drivable path from `query`'s start to its goal's position, or `None` where there is none.
+///
+/// Bends that leave the robot steering to spare are tried first: a car that slips cannot follow its
+/// tightest.
 #[must_use]
 pub fn plan_route(workspace: &Workspace, query: &Query) -> Option<GuidePath> {
-    let steering = Steering::of(workspace.robot.min_turning_radius_m());
-    ridge(workspace, query, &steering).or_else(|| searched(workspace, query, &steering))
+    let radius_m = workspace.robot.min_turning_radius_m();
+    let spares: &[f64] = if radius_m > 0.0 { &SPARE_RADII } else { &[1.0] };
+    spares.iter().find_map(|spare| {
+        let steering = Steering::of(spare * radius_m);
+        ridge(workspace, query, &steering).or_else(|| searched(workspace, query, &steering))
+    })
 }
 
 fn ridge(workspace: &Workspace, query: &Query, steering: &Steering) -> Option<GuidePath> {
