@@ -65,7 +65,12 @@ pub fn hash(bytes: &[u8]) -> String {
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io(folder))?;
-    let mut file = tempfile::Builder::new().suffix(".tmp").tempfile_in(folder).map_err(io(folder))?;
+    let mut builder = tempfile::Builder::new();
+    builder.suffix(".tmp");
+    // What the user's umask allows, like any other file; temporary files are private by default.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).map_err(io(folder))?;
     file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(io(path))?;
     file.persist(path).map_err(|error| io(path)(error.error))?;
     Ok(())
