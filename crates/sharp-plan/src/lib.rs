@@ -24,9 +24,12 @@ mod starts;
 mod stats;
 mod task;
 
+#[cfg(test)]
+mod drawn;
+
 pub use baseline::{
-    Baseline, ComparisonSettings, Driven, Host, Mppi, MppiSettings, Pilot, Readiness, Rrt, Sac, SacBudget,
-    Situation, SpeedRule, Track, TrackSettings, compare, plan_route,
+    Baseline, ComparisonSettings, Driven, Host, Mppi, MppiSettings, Pilot, Readiness, RoutePlanner, Rrt, Sac,
+    SacBudget, Situation, SpeedRule, Track, TrackSettings, compare,
 };
 pub use certify::{Certificate, Trial};
 pub use composed::{ComposedPolicy, Decision, Events};

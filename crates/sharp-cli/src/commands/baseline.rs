@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::{
-    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, Query, Rrt, Sac, SacBudget,
-    Tally, Track, TrackSettings, Workspace, compare, plan_route,
+    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, Query, RoutePlanner, Rrt, Sac, SacBudget,
+    Tally, Track, TrackSettings, Workspace, compare,
 };
 use sharp_sim::{NoiseModel, SimulatorKind};
 use sharp_space::Seed;
@@ -136,7 +136,8 @@ impl Bench<'_> {
             return Ok(Some(self.drive(&Rrt { workspace, query: *query, settings, seed: *seed }, stopwatch, stop)));
         }
         stopwatch.enter("plan");
-        let route = plan_route(workspace, query);
+        let planner = RoutePlanner::new(workspace);
+        let route = planner.plan(query);
         stopwatch.stop();
         if args.method == Method::Sac {
             let length_s = route.map(|route| 6.0 * route.length_m() / workspace.robot.max_speed_mps);
@@ -145,10 +146,10 @@ impl Bench<'_> {
         let Some(route) = route else { return Ok(None) };
         let robot = &workspace.robot;
         Ok(Some(if args.method == Method::Track {
-            self.drive(&Track { workspace, query: *query, route, settings: TrackSettings::new(robot) }, stopwatch, stop)
+            self.drive(&Track { workspace, planner: &planner, query: *query, route, settings: TrackSettings::new(robot) }, stopwatch, stop)
         } else {
             let settings = MppiSettings::new(robot);
-            self.drive(&Mppi { workspace, query: *query, route, settings, seed: *seed }, stopwatch, stop)
+            self.drive(&Mppi { workspace, planner: &planner, query: *query, route, settings, seed: *seed }, stopwatch, stop)
         }))
     }
 

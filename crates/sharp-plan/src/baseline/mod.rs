@@ -18,7 +18,7 @@ use sharp_sim::{ActionSettings, AnySim, NoiseModel, RobotState, SimulatorKind, V
 use sharp_space::Seed;
 
 pub use mppi::{Mppi, MppiSettings};
-pub use route::plan_route;
+pub use route::RoutePlanner;
 pub use rrt::Rrt;
 pub use sac::{Sac, SacBudget};
 pub use track::{SpeedRule, Track, TrackSettings};

@@ -12,7 +12,7 @@ use sharp_guide::GuidePath;
 use sharp_sim::{ActionSettings, Command, Drive, RobotModel, RobotState, WaypointController};
 use sharp_space::{CollisionChecker, Heading, Pose, Seed, Stream, Vector};
 
-use crate::baseline::route::OnRoute;
+use crate::baseline::route::{OnRoute, RoutePlanner};
 use crate::baseline::track::TrackSettings;
 use crate::baseline::{Baseline, Pilot, Readiness, Situation};
 use crate::percept::{Tracker, Workspace};
@@ -71,6 +71,8 @@ impl MppiSettings {
 pub struct Mppi<'a> {
     /// Map and robot.
     pub workspace: &'a Workspace,
+    /// Plans anew on the way.
+    pub planner: &'a RoutePlanner<'a>,
     /// The problem.
     pub query: Query,
     /// The path of every episode's beginning.
@@ -83,11 +85,11 @@ pub struct Mppi<'a> {
 
 impl Baseline for Mppi<'_> {
     fn pilot(&self, episode: u64) -> Box<dyn Pilot + '_> {
-        let Self { workspace, query, route, settings, seed } = self;
+        let Self { workspace, planner, query, route, settings, seed } = self;
         Box::new(MppiPilot {
             workspace,
             settings,
-            on_route: OnRoute::new(workspace, *query, route.clone()),
+            on_route: OnRoute::new(planner, *query, route.clone()),
             model: Model::new(&workspace.robot),
             mean: vec![Push::default(); settings.horizon],
             seed: seed.child("mppi", episode),
@@ -139,7 +141,8 @@ impl Pilot for MppiPilot<'_> {
         let mut rng = self.seed.stream("decision", self.decisions);
         self.decisions += 1;
         let samples = self.samples(&mut rng);
-        let costs: Vec<f64> = samples.chunks(self.settings.horizon).map(|pushes| self.cost(state, pushes)).collect();
+        let costs: Vec<f64> =
+            samples.chunks(self.settings.horizon).map(|pushes| self.cost(state, pushes)).collect();
         self.mean = weighted_mean(&samples, &costs, self.settings);
         let OnRoute { route, tracker, .. } = &self.on_route;
         let base = self.settings.base.waypoint(self.workspace, route, tracker, state);
@@ -244,7 +247,12 @@ impl Model {
     }
 
     /// Moves `state` by one action; false as soon as `is_free` denies a state on the way.
-    fn act(&self, state: &mut RobotState, waypoint: PolarWaypoint, mut is_free: impl FnMut(&RobotState) -> bool) -> bool {
+    fn act(
+        &self,
+        state: &mut RobotState,
+        waypoint: PolarWaypoint,
+        mut is_free: impl FnMut(&RobotState) -> bool,
+    ) -> bool {
         let aim = self.controller.aim(&state.pose, waypoint.to_world(&state.pose), waypoint.speed_mps);
         let steps = (ActionSettings::default().action_s / MODEL_DT_S).round() as usize;
         (0..steps).all(|_| {
@@ -273,7 +281,8 @@ impl Model {
             (Drive::Differential { .. }, Command::Steer { .. }) => (0.0, 0.0),
         };
         let heading = state.pose.heading.radians();
-        let way = Heading::new(heading + slip_rad + 0.5 * turn_rad).unit() * (state.wheel_speed_mps * MODEL_DT_S);
+        let way =
+            Heading::new(heading + slip_rad + 0.5 * turn_rad).unit() * (state.wheel_speed_mps * MODEL_DT_S);
         state.pose = Pose::at(state.pose.position + way, Heading::new(heading + turn_rad));
         state.velocity = Vector::new(state.wheel_speed_mps, 0.0);
     }

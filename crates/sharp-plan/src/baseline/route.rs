@@ -6,7 +6,7 @@
 use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, plan_guide};
 use sharp_motion::{Budget, HybridSettings, Path, RrtSettings, Steering, hybrid_astar};
 use sharp_sim::RobotState;
-use sharp_space::{Heading, Point, Pose, Seed};
+use sharp_space::{CollisionChecker, Footprint, FootprintChecker, Heading, Point, Pose, Seed};
 
 use crate::baseline::{Readiness, Situation, nominal_time_s};
 use crate::percept::{Tracker, Workspace};
@@ -19,44 +19,78 @@ const STILL_ACTIONS: u32 = 6;
 /// A robot that moved less than this and turned less than [`STILL_TURN_RAD`] stands still, metres.
 const STILL_M: f64 = 0.15;
 const STILL_TURN_RAD: f64 = 0.3;
-/// Turning radii that routes are planned with, in units of the robot's own.
-const SPARE_RADII: [f64; 3] = [1.5, 1.25, 1.0];
+/// What is tried in turn: metres added to the outline on each side, and the turning radius in units of
+/// the robot's own. A car that slips cannot follow its tightest bend.
+const SPARES: [(f64, f64); 5] = [(0.10, 1.5), (0.06, 1.5), (0.06, 1.25), (0.03, 1.25), (0.0, 1.0)];
 /// Actions between two plans: what a new path needs to show its worth.
 const PATIENCE_ACTIONS: u32 = 6;
 
-/// A drivable path from `query`'s start to its goal's position, or `None` where there is none.
-///
-/// Bends that leave the robot steering to spare are tried first: a car that slips cannot follow its
-/// tightest.
-#[must_use]
-pub fn plan_route(workspace: &Workspace, query: &Query) -> Option<GuidePath> {
-    let radius_m = workspace.robot.min_turning_radius_m();
-    let spares: &[f64] = if radius_m > 0.0 { &SPARE_RADII } else { &[1.0] };
-    spares.iter().find_map(|spare| {
-        let steering = Steering::of(spare * radius_m);
-        ridge(workspace, query, &steering).or_else(|| searched(workspace, query, &steering))
-    })
+/// Plans routes for one robot in one map.
+#[derive(Clone, Debug)]
+pub struct RoutePlanner<'a> {
+    workspace: &'a Workspace,
+    attempts: Vec<Attempt>,
 }
 
-fn ridge(workspace: &Workspace, query: &Query, steering: &Steering) -> Option<GuidePath> {
-    let request = GuideRequest {
-        start: GuideEnd { position: query.start.position, heading: Some(query.start.heading) },
-        goal: GuideEnd { position: query.goal.position, heading: None },
-        allowed: &|_| true,
-    };
-    // No sampling: hybrid A* finds shorter paths, and finds them always.
-    let sampling = RrtSettings { budget: Budget { iterations: 0 }, ..RrtSettings::default() };
-    let settings = GuideSettings { sampling, seeds: 0, ..GuideSettings::default() };
-    let unused = &mut Seed(0).stream("route", 0);
-    plan_guide(&request, &workspace.checker, steering, &settings, unused).ok()
+/// An outline and a turning radius with something to spare.
+#[derive(Clone, Debug)]
+struct Attempt {
+    checker: FootprintChecker,
+    steering: Steering,
 }
 
-fn searched(workspace: &Workspace, query: &Query, steering: &Steering) -> Option<GuidePath> {
-    let goal_radius_m = 0.5 * workspace.robot.goal_tolerance_m;
-    let settings = HybridSettings { goal_radius_m, ..HybridSettings::default() };
-    let query = sharp_motion::Query { start: query.start, goal: query.goal };
-    let path = hybrid_astar(&query, &workspace.checker, steering, &settings).path()?;
-    as_guide(&path, steering)
+impl<'a> RoutePlanner<'a> {
+    /// A planner for the robot and the map of `workspace`.
+    #[must_use]
+    pub fn new(workspace: &'a Workspace) -> Self {
+        let attempts =
+            SPARES.iter().map(|&(margin_m, bend)| Attempt::new(workspace, margin_m, bend)).collect();
+        Self { workspace, attempts }
+    }
+
+    /// A drivable path from `query`'s start to its goal's position, or `None` where there is none.
+    #[must_use]
+    pub fn plan(&self, query: &Query) -> Option<GuidePath> {
+        let goal_radius_m = 0.5 * self.workspace.robot.goal_tolerance_m;
+        self.attempts
+            .iter()
+            .filter(|attempt| attempt.checker.is_free(query.start))
+            .find_map(|attempt| attempt.ridge(query).or_else(|| attempt.searched(query, goal_radius_m)))
+    }
+}
+
+impl Attempt {
+    fn new(workspace: &Workspace, margin_m: f64, bend: f64) -> Self {
+        let footprint = &workspace.robot.footprint;
+        let (length_m, width_m) = (footprint.half_length_m() + margin_m, footprint.half_width_m() + margin_m);
+        let outline = Footprint::rectangle(length_m, width_m).unwrap_or(*footprint);
+        Self {
+            checker: FootprintChecker::new(&workspace.grid, outline),
+            steering: Steering::of(bend * workspace.robot.min_turning_radius_m()),
+        }
+    }
+
+    /// Along the ridge of clearance.
+    fn ridge(&self, query: &Query) -> Option<GuidePath> {
+        let request = GuideRequest {
+            start: GuideEnd { position: query.start.position, heading: Some(query.start.heading) },
+            goal: GuideEnd { position: query.goal.position, heading: None },
+            allowed: &|_| true,
+        };
+        // No sampling: hybrid A* finds shorter paths, and finds them always.
+        let sampling = RrtSettings { budget: Budget { iterations: 0 }, ..RrtSettings::default() };
+        let settings = GuideSettings { sampling, seeds: 0, ..GuideSettings::default() };
+        let unused = &mut Seed(0).stream("route", 0);
+        plan_guide(&request, &self.checker, &self.steering, &settings, unused).ok()
+    }
+
+    /// By hybrid A*.
+    fn searched(&self, query: &Query, goal_radius_m: f64) -> Option<GuidePath> {
+        let settings = HybridSettings { goal_radius_m, ..HybridSettings::default() };
+        let query = sharp_motion::Query { start: query.start, goal: query.goal };
+        let path = hybrid_astar(&query, &self.checker, &self.steering, &settings).path()?;
+        as_guide(&path, &self.steering)
+    }
 }
 
 /// The path as a guide: a car's with its headings; otherwise the corners at which the robot turns in
@@ -77,7 +111,7 @@ fn as_guide(path: &Path, steering: &Steering) -> Option<GuidePath> {
 /// A robot on its route, which is planned anew when the robot leaves it or stands still.
 #[derive(Debug)]
 pub(crate) struct OnRoute<'a> {
-    workspace: &'a Workspace,
+    planner: &'a RoutePlanner<'a>,
     query: Query,
     pub(crate) route: GuidePath,
     pub(crate) tracker: Tracker,
@@ -88,9 +122,9 @@ pub(crate) struct OnRoute<'a> {
 }
 
 impl<'a> OnRoute<'a> {
-    pub(crate) fn new(workspace: &'a Workspace, query: Query, route: GuidePath) -> Self {
+    pub(crate) fn new(planner: &'a RoutePlanner<'a>, query: Query, route: GuidePath) -> Self {
         let tracker = Tracker::start(&route, &query.start);
-        Self { workspace, query, route, tracker, anchor: (query.start, 0), actions: None }
+        Self { planner, query, route, tracker, anchor: (query.start, 0), actions: None }
     }
 
     /// Projects the robot onto its route; a new one is planned from where it is if it has left it.
@@ -110,7 +144,7 @@ impl<'a> OnRoute<'a> {
             return Readiness::Ready;
         }
         let query = Query { start: state.pose, ..self.query };
-        match plan_route(self.workspace, &query) {
+        match self.planner.plan(&query) {
             Some(route) => {
                 self.route = route;
                 self.tracker = Tracker::start(&self.route, &state.pose);
@@ -126,7 +160,9 @@ impl<'a> OnRoute<'a> {
     }
 
     fn planned(&self) -> Readiness {
-        Readiness::Planned { nominal_time_s: nominal_time_s(self.workspace, self.route.length_m(), 0.0) }
+        Readiness::Planned {
+            nominal_time_s: nominal_time_s(self.planner.workspace, self.route.length_m(), 0.0),
+        }
     }
 
     fn watch(&mut self, state: &RobotState) {

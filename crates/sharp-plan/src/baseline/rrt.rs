@@ -31,7 +31,13 @@ pub struct Rrt<'a> {
 
 impl Baseline for Rrt<'_> {
     fn pilot(&self, episode: u64) -> Box<dyn Pilot + '_> {
-        Box::new(RrtPilot { baseline: self, seed: self.seed.child("rrt", episode), plans: 0, hops: vec![], next: 0 })
+        Box::new(RrtPilot {
+            baseline: self,
+            seed: self.seed.child("rrt", episode),
+            plans: 0,
+            hops: vec![],
+            next: 0,
+        })
     }
 }
 

@@ -8,7 +8,8 @@ use std::ops::ControlFlow;
 
 use rand::RngExt;
 use sharp_rl::{
-    Actor, ActorScratch, Environment, EnvironmentSpec, Progress, Step, StopRule, TrainError, TrainSettings, train,
+    Actor, ActorScratch, Environment, EnvironmentSpec, Progress, Step, StopRule, TrainError, TrainSettings,
+    train,
 };
 use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, RobotModel, RobotState, Vehicle};
 use sharp_space::{Pose, Seed, Stream, Vector};
@@ -166,7 +167,8 @@ impl Environment for FlatTask {
         let after = self.vehicle.act_at(command.to_world(&pose), command.speed_mps).after.pose;
         self.actions += 1;
         observe(&self.query, &after, observation);
-        let success = (after.position - self.query.goal.position).norm() <= self.vehicle.robot().goal_tolerance_m;
+        let success =
+            (after.position - self.query.goal.position).norm() <= self.vehicle.robot().goal_tolerance_m;
         Step {
             reward: if success { GOAL_REWARD } else { STEP_REWARD },
             terminated: success,

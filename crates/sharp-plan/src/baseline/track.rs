@@ -3,12 +3,12 @@
 //! A [`Follower`] steers; a [`SpeedRule`] slows it down where room is scarce, before bends and while
 //! the robot is off its line. The route is planned anew when the robot leaves it or stands still.
 
-use sharp_guide::GuidePath;
 use serde::{Deserialize, Serialize};
+use sharp_guide::GuidePath;
 use sharp_sim::{RobotModel, RobotState};
 use sharp_space::Heading;
 
-use crate::baseline::route::OnRoute;
+use crate::baseline::route::{OnRoute, RoutePlanner};
 use crate::baseline::{Baseline, Pilot, Readiness, Situation};
 use crate::percept::{Tracker, Workspace};
 use crate::planner::Query;
@@ -34,7 +34,13 @@ pub struct SpeedRule {
 impl SpeedRule {
     /// The speed for a robot at `state`, metres per second.
     #[must_use]
-    pub fn speed_mps(&self, workspace: &Workspace, route: &GuidePath, tracker: &Tracker, state: &RobotState) -> f64 {
+    pub fn speed_mps(
+        &self,
+        workspace: &Workspace,
+        route: &GuidePath,
+        tracker: &Tracker,
+        state: &RobotState,
+    ) -> f64 {
         let robot = &workspace.robot;
         let view = GuideView { guide: route, next: None };
         let half_width_m = robot.footprint.inscribed_radius_m();
@@ -112,6 +118,8 @@ impl TrackSettings {
 pub struct Track<'a> {
     /// Map and robot.
     pub workspace: &'a Workspace,
+    /// Plans anew on the way.
+    pub planner: &'a RoutePlanner<'a>,
     /// The problem.
     pub query: Query,
     /// The path of every episode's beginning.
@@ -122,7 +130,7 @@ pub struct Track<'a> {
 
 impl Baseline for Track<'_> {
     fn pilot(&self, _episode: u64) -> Box<dyn Pilot + '_> {
-        let on_route = OnRoute::new(self.workspace, self.query, self.route.clone());
+        let on_route = OnRoute::new(self.planner, self.query, self.route.clone());
         Box::new(TrackPilot { baseline: self, on_route })
     }
 }
