@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
-/// Folders at the root that are not part of the repository.
+/// Names of folders that are not part of the repository.
 const FOREIGN: [&str; 3] = [".git", "target", "out"];
 
 /// The root of the workspace: the parent of this package's folder.
@@ -63,9 +63,10 @@ fn visit(folder: &Path, prefix: &str, files: &mut BTreeMap<String, String>) -> a
     let entries = fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
     for entry in entries {
         let entry = entry.with_context(|| format!("cannot list {}", folder.display()))?;
-        let path = format!("{prefix}{}", entry.file_name().to_string_lossy());
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let path = format!("{prefix}{name}");
         let kind = entry.file_type().with_context(|| format!("cannot inspect {path}"))?;
-        if kind.is_dir() && !FOREIGN.contains(&path.as_str()) {
+        if kind.is_dir() && !FOREIGN.contains(&name.as_str()) {
             visit(&entry.path(), &format!("{path}/"), files)?;
         } else if kind.is_file() {
             let bytes = fs::read(entry.path()).with_context(|| format!("cannot read {path}"))?;

@@ -213,3 +213,102 @@ impl ComposedPolicy {
         self.advance()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+    use sharp_space::Pose;
+
+    use super::*;
+    use crate::drawn::plan;
+
+    fn at(x: f64, y: f64) -> RobotState {
+        RobotState::at_rest(Pose::new(x, y, 0.0))
+    }
+
+    /// Carries a robot from waypoint to waypoint and returns the legs it ran, in order.
+    fn carry(policy: &mut ComposedPolicy, mut state: RobotState) -> (Decision, Vec<String>) {
+        let mut legs = vec![policy.leg().id.to_string()];
+        for _ in 0..500 {
+            let decision = policy.decide();
+            legs.push(policy.leg().id.to_string());
+            match decision {
+                Decision::Waypoint(point, _) | Decision::Recovering(point, _) => {
+                    let towards = point - state.pose.position;
+                    state = RobotState::at_rest(Pose::new(point.x, point.y, towards.y.atan2(towards.x)));
+                    policy.observe(state);
+                }
+                Decision::Reached | Decision::Lost => {
+                    legs.dedup();
+                    return (decision, legs);
+                }
+            }
+        }
+        panic!("no end after 500 decisions, legs {legs:?}");
+    }
+
+    #[test]
+    fn the_automaton_runs_its_legs_in_order_to_the_goal() {
+        for (kind, expected) in [
+            (OptionKind::Centroid, &["first:0", "c:0-1", "c:1-2", "last:2"][..]),
+            (OptionKind::Interface, &["first:0", "i:0-1-2", "last:1"][..]),
+        ] {
+            for recovery in [false, true] {
+                let start = at(1.0, 2.2);
+                let mut policy = ComposedPolicy::new(plan(kind), start, recovery);
+                let (end, legs) = carry(&mut policy, start);
+                assert_eq!(end, Decision::Reached, "{kind:?}");
+                assert_eq!(legs, expected, "{kind:?}");
+                assert_eq!(policy.events(), Events::default(), "{kind:?}: all went as planned");
+            }
+        }
+    }
+
+    #[test]
+    fn an_initiation_set_is_entered_at_once_and_those_passed_by_are_skipped() {
+        let mut policy = ComposedPolicy::new(plan(OptionKind::Centroid), at(1.0, 2.2), false);
+        policy.decide();
+        let second = policy.plan.solution.legs[1].leg.target.center();
+        policy.observe(at(second.x, second.y));
+        policy.decide();
+        assert_eq!(policy.leg().id.to_string(), "first:0", "I of the first option was not reached");
+        let first = policy.plan.solution.legs[0].leg.target.center();
+        policy.observe(at(first.x, first.y));
+        policy.decide();
+        assert_eq!(policy.leg().id.to_string(), "c:0-1", "x is in the first option's I");
+    }
+
+    #[test]
+    fn a_robot_that_is_carried_off_gets_a_new_plan_only_with_recovery() {
+        for recovery in [false, true] {
+            let mut policy = ComposedPolicy::new(plan(OptionKind::Centroid), at(1.0, 2.2), recovery);
+            policy.decide();
+            // Into the last region's state, far from the first guide.
+            for index in 0..STRAY_ACTIONS_MAX {
+                policy.observe(at(8.2 + 0.2 * f64::from(index), 1.0));
+            }
+            let decision = policy.decide();
+            let recovered = matches!(decision, Decision::Recovering(..));
+            assert_eq!(recovered, recovery, "{decision:?}");
+            assert_eq!(policy.events().strays, STRAY_ACTIONS_MAX, "each stray counts");
+            assert_eq!(policy.events().recoveries, u32::from(recovery), "new plans");
+            let from = policy.leg().from;
+            let expected = if recovery { 2 } else { 0 };
+            assert_eq!(from.0, expected, "the leg that runs leaves the state the robot is in, with recovery");
+        }
+    }
+
+    #[test]
+    fn a_robot_that_never_moves_is_given_up() {
+        for (recovery, recoveries) in [(false, 0), (true, RECOVERIES_MAX)] {
+            let mut policy = ComposedPolicy::new(plan(OptionKind::Centroid), at(1.0, 2.2), recovery);
+            let mut decisions = 0;
+            while policy.decide() != Decision::Lost {
+                policy.observe(at(1.0, 2.2));
+                decisions += 1;
+                assert!(decisions < 1000, "never given up");
+            }
+            assert_eq!(policy.events().recoveries, recoveries, "with recovery: {recovery}");
+        }
+    }
+}

@@ -158,3 +158,53 @@ fn run_episode(
 pub fn success(episodes: &[Episode]) -> Tally {
     Tally::count(episodes.iter().map(|episode| episode.end == EpisodeEnd::Reached))
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::plan;
+
+    fn episodes(settings: impl Fn(RunSettings) -> RunSettings) -> Vec<Episode> {
+        let plan = plan(OptionKind::Centroid);
+        run(&plan, &settings(RunSettings::new(&plan, 3, Seed(1))), &|| 0.0)
+    }
+
+    #[test]
+    fn without_noise_the_plan_holds_in_both_simulators() {
+        for simulator in [SimulatorKind::Planar, SimulatorKind::Kinematic] {
+            let episodes = episodes(|settings| RunSettings { simulator, ..settings });
+            assert_eq!(success(&episodes), Tally { episodes: 3, successes: 3 }, "{simulator:?}");
+            for episode in &episodes {
+                assert!((6.0..10.0).contains(&episode.path_m), "{simulator:?}: 8 m are {} m", episode.path_m);
+                assert_eq!(episode.contacts, 0, "{simulator:?}");
+                assert!(
+                    episode.decisions_us.len() >= episode.trace.len(),
+                    "{simulator:?}: a decision a pose"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_time_is_no_success() {
+        let episodes = episodes(|settings| RunSettings { time_limit_s: 2.0, ..settings });
+        assert!(episodes.iter().all(|episode| episode.end == EpisodeEnd::TimedOut), "{episodes:?}");
+        assert_eq!(success(&episodes).successes, 0, "none in two seconds");
+    }
+
+    #[test]
+    fn noise_makes_episodes_differ_and_seeds_repeat_them() {
+        let noisy = |seed| {
+            let noise = NoiseModel::by_name("harsh").expect("a built-in noise");
+            let episodes =
+                episodes(|settings| RunSettings { noise: noise.clone(), seed: Seed(seed), ..settings });
+            episodes.into_iter().map(|episode| episode.trace).collect::<Vec<_>>()
+        };
+        let first = noisy(1);
+        assert_eq!(first, noisy(1), "equal seeds");
+        assert_ne!(first, noisy(2), "other seeds");
+        assert_ne!(first[0], first[1], "episodes of one run");
+    }
+}

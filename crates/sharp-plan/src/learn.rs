@@ -306,3 +306,65 @@ fn learnt(policy: OptionPolicy, certificate: Certificate, (env_steps, gradient_s
     let Certificate { tally, mean_time_s } = certificate;
     Learnt { policy, verified: tally, mean_time_s, env_steps, gradient_steps }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::{HALL, along, followed, legs, world};
+
+    #[test]
+    fn a_leg_that_fails_costs_its_recoveries() {
+        let (workspace, _) = world(HALL, OptionKind::Centroid);
+        let with =
+            |successes| Learnt { verified: Tally { episodes: 100, successes }, ..followed(&workspace) };
+        assert_eq!(with(100).cost_s(), 5.0, "its mean time");
+        assert_eq!(with(50).cost_s(), 40.0, "twice the time and half a minute");
+        assert!(with(0).cost_s() > 1000.0, "dear beyond use");
+    }
+
+    #[test]
+    fn rewards_know_their_three_places() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let leg = &legs(&workspace, &abstraction, along())[1];
+        let paper = RewardMode::Paper(PseudoReward::default());
+        let shaped = RewardMode::Shaped(ShapedReward::default());
+        let reward = |mode: &RewardMode, from: &Pose, to: &Pose, success| {
+            let (before, after) = (Tracker::start(&leg.guide, from), Tracker::start(&leg.guide, to));
+            mode.of(leg, to, (&before, &after), false, success)
+        };
+        let (start, middle) = (leg.guide.start(), leg.guide.pose_at(0.5 * leg.guide.length_m()));
+        let astray = Pose::new(9.0, 2.0, 0.0);
+        assert_eq!(reward(&paper, &start, &leg.guide.end(), true), 1000.0, "r_t");
+        assert_eq!(reward(&paper, &start, &astray, false), -100.0, "r_p");
+        let (near, far) = (reward(&paper, &start, &middle, false), reward(&paper, &start, &start, false));
+        assert!(far < near && near < 0.0, "nearer the end is better: {near} against {far}");
+        let (ahead, back) =
+            (reward(&shaped, &start, &middle, false), reward(&shaped, &middle, &start, false));
+        assert!(ahead > 0.0 && back < 0.0, "progress pays {ahead}, going back {back}");
+    }
+
+    #[test]
+    fn an_easy_leg_is_certified_without_a_network() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let leg = &legs(&workspace, &abstraction, along())[1];
+        let starts = Arc::new(Starts::exactly(sharp_sim::RobotState::at_rest(leg.guide.start())));
+        let settings = LearnSettings::new(LearningMode::Fast);
+        let noise = NoiseModel::by_name("nominal").expect("a built-in noise");
+        let lesson = Lesson {
+            workspace: &workspace,
+            leg,
+            next: None,
+            starts,
+            noise: &noise,
+            settings: &settings,
+            seed: Seed(1),
+        };
+        let learnt = lesson.learn(&|| false).expect("a sound task");
+        assert!(matches!(learnt.policy, OptionPolicy::Follower(_)), "a network in an open hall");
+        assert_eq!(learnt.verified.episodes, 1000, "certified on fresh episodes");
+        assert!(learnt.verified.rate() >= 0.99, "only {:?}", learnt.verified);
+        assert!(matches!(lesson.learn(&|| true), Err(LearnFailure::Stopped)), "a stop is heard");
+    }
+}

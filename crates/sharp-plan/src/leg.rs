@@ -179,3 +179,63 @@ pub(crate) fn allowed_states(id: LegId, from: StateId, to: StateId) -> Vec<State
         LegId::First(_) | LegId::Last(..) | LegId::Direct => vec![from, to],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+    use sharp_space::Heading;
+
+    use super::*;
+    use crate::drawn::{HALL, along, legs, world};
+
+    fn names(kind: OptionKind) -> Vec<String> {
+        let (workspace, abstraction) = world(HALL, kind);
+        legs(&workspace, &abstraction, along()).iter().map(|leg| leg.id.to_string()).collect()
+    }
+
+    #[test]
+    fn a_plan_has_a_first_leg_options_and_a_last_leg() {
+        assert_eq!(names(OptionKind::Centroid), ["first:0", "c:0-1", "c:1-2", "last:2"]);
+        assert_eq!(names(OptionKind::Interface), ["first:0", "i:0-1-2", "last:1"]);
+    }
+
+    #[test]
+    fn each_leg_begins_where_the_one_before_it_ends() {
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            let (workspace, abstraction) = world(HALL, kind);
+            let legs = legs(&workspace, &abstraction, along());
+            for pair in legs.windows(2) {
+                let name = format!("{} to {}", pair[0].id, pair[1].id);
+                let source = pair[1].source.clone().map(Target::Endpoint);
+                assert_eq!(source.as_ref(), Some(&pair[0].target), "{name}: β is not I");
+                let arrived = Pose::at(pair[0].target.center(), Heading::default());
+                assert!(pair[0].is_done(&arrived), "{name}: the centre of β is in β");
+                assert!(pair[1].is_allowed(&arrived), "{name}: arriving is straying");
+                assert!(!pair[1].is_done(&arrived), "{name}: over before it begins");
+            }
+            let last = &legs[legs.len() - 1];
+            assert!(last.source.is_some() && last.is_done(&along().goal), "the goal is the last target");
+            assert!(!last.is_done(&Pose::new(8.5, 2.2, 0.0)), "half a metre before the goal is not there");
+        }
+    }
+
+    #[test]
+    fn leaving_both_states_is_straying_and_standing_at_a_wall_is_not() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let legs = legs(&workspace, &abstraction, along());
+        let option = legs.iter().find(|leg| leg.id.role() == Role::Option).expect("two options");
+        assert_eq!(option.allowed, [StateId(0), StateId(1)], "i and j");
+        for (x, y, allowed) in [(1.0, 2.0, true), (5.0, 3.0, true), (9.0, 2.0, false), (5.0, 0.1, true)] {
+            assert_eq!(option.is_allowed(&Pose::new(x, y, 0.0)), allowed, "at ({x}, {y})");
+        }
+    }
+
+    #[test]
+    fn the_horizon_grows_with_the_guide() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        for leg in legs(&workspace, &abstraction, along()) {
+            let beyond = f64::from(leg.horizon_actions(0.15)) - leg.guide.length_m() / 0.05;
+            assert!((9.99..11.01).contains(&beyond), "{}: {beyond} actions beyond three times", leg.id);
+        }
+    }
+}

@@ -205,3 +205,106 @@ fn load_option(file: OptionFile, folder: &Path) -> Result<StoredOption, FileErro
     };
     Ok(StoredOption { guide: file.guide, learnt })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use sharp_rbvd::StateId;
+    use sharp_rl::EnvironmentSpec;
+    use sharp_sim::RobotModel;
+    use sharp_space::Seed;
+
+    use super::*;
+    use crate::drawn::straight;
+
+    const TO_ONE: OptionId = OptionId::Centroid { from: StateId(0), to: StateId(1) };
+    const TO_TWO: OptionId = OptionId::Centroid { from: StateId(1), to: StateId(2) };
+
+    fn stored(policy: OptionPolicy) -> StoredOption {
+        let verified = Tally { episodes: 1000, successes: 990 };
+        let learnt = Learnt { policy, verified, mean_time_s: 4.5, env_steps: 600, gradient_steps: 300 };
+        StoredOption { guide: straight((0.0, 0.0), (2.0, 0.0)), learnt }
+    }
+
+    fn follower() -> OptionPolicy {
+        OptionPolicy::Follower(Follower::cautious(&RobotModel::husky()))
+    }
+
+    fn network() -> OptionPolicy {
+        let form = Form::Absolute { reach_m: 0.5 };
+        let spec = EnvironmentSpec { observation_len: form.observation_len(), action_len: 2 };
+        let actor = Actor::new(spec, &[8, 8], &mut Seed(1).stream("actor", 0));
+        OptionPolicy::Learnt { form, actor: Box::new(actor) }
+    }
+
+    /// A library of a follower and a network on disk.
+    fn library(root: &Path) -> OptionLibrary {
+        let mut library = OptionLibrary::open(root, "here").unwrap();
+        library.insert(TO_ONE, stored(follower())).unwrap();
+        library.insert(TO_TWO, stored(network())).unwrap();
+        library
+    }
+
+    fn weights(root: &Path) -> PathBuf {
+        let mut files = fs::read_dir(root.join("here")).unwrap().map(|entry| entry.unwrap().path());
+        files.find(|path| path.extension().is_some_and(|ending| ending == "safetensors")).unwrap()
+    }
+
+    #[test]
+    fn options_survive_a_round_trip() {
+        let root = tempfile::tempdir().unwrap();
+        let library = library(root.path());
+        let opened = OptionLibrary::open(root.path(), "here").unwrap();
+        assert_eq!(opened.iter().map(|(id, _)| id).collect::<Vec<_>>(), [TO_ONE, TO_TWO], "by name");
+        for (id, option) in library.iter() {
+            let read = opened.get(id).unwrap();
+            assert_eq!(read.guide, option.guide, "{id}");
+            let numbers = |learnt: &Learnt| (learnt.verified, learnt.mean_time_s, learnt.env_steps);
+            assert_eq!(numbers(&read.learnt), numbers(&option.learnt), "{id}");
+            match (&read.learnt.policy, &option.learnt.policy) {
+                (OptionPolicy::Follower(read), OptionPolicy::Follower(written)) => assert_eq!(read, written),
+                (OptionPolicy::Learnt { actor: read, .. }, OptionPolicy::Learnt { actor: written, .. }) => {
+                    assert_eq!(read, written);
+                }
+                (read, written) => panic!("{id}: {written:?} became {read:?}"),
+            }
+        }
+        assert!(
+            OptionLibrary::open(root.path(), "elsewhere").unwrap().is_empty(),
+            "another key, another world"
+        );
+    }
+
+    #[test]
+    fn damage_is_named_with_its_file() {
+        let root = tempfile::tempdir().unwrap();
+        library(root.path());
+        let refused = || OptionLibrary::open(root.path(), "here").unwrap_err().to_string();
+        let weights = weights(root.path());
+        let sound = fs::read(&weights).unwrap();
+        fs::write(&weights, &sound[..sound.len() - 1]).unwrap();
+        assert!(refused().contains(&*weights.to_string_lossy()), "{}", refused());
+        fs::remove_file(&weights).unwrap();
+        assert!(refused().contains(&*weights.to_string_lossy()), "{}", refused());
+        fs::write(&weights, sound).unwrap();
+
+        let option = root.path().join("here/c_0-1.ron");
+        fs::rename(&option, root.path().join("here/c_5-6.ron")).unwrap();
+        assert!(refused().contains("c_5-6.ron: holds the option c:0-1"), "{}", refused());
+        fs::rename(root.path().join("here/c_5-6.ron"), &option).unwrap();
+        assert_eq!(OptionLibrary::open(root.path(), "here").unwrap().len(), 2, "all is well again");
+    }
+
+    #[test]
+    fn what_an_interrupted_write_leaves_is_ignored() {
+        let root = tempfile::tempdir().unwrap();
+        library(root.path());
+        fs::write(root.path().join("here/.half.tmp"), "c").unwrap();
+        assert_eq!(
+            OptionLibrary::open(root.path(), "here").unwrap().len(),
+            2,
+            "temporary files are no options"
+        );
+    }
+}

@@ -176,3 +176,63 @@ pub(crate) fn absolute_observation(percept: &Percept, guide: &GuidePath, observa
         *entry = value as f32;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::{HALL, straight, world};
+
+    #[test]
+    fn rays_feel_the_walls_of_a_hall() {
+        let (workspace, _) = world(HALL, OptionKind::Centroid);
+        // The hall's inside reaches from 0.4 to 9.6 m and from 0.4 to 3.6 m.
+        for (x, y, angle, expected_m) in
+            [(1.0, 2.0, std::f64::consts::PI, 0.6), (5.0, 1.0, -1.57, 0.6), (5.0, 2.0, 0.0, RAY_LENGTH_M)]
+        {
+            let length_m = ray_length_m(&workspace, &Pose::new(x, y, 0.0), angle);
+            assert!((length_m - expected_m).abs() < 0.4, "from ({x}, {y}) at {angle}: {length_m} m");
+        }
+    }
+
+    #[test]
+    fn observations_fill_their_vectors_with_moderate_numbers() {
+        let (workspace, _) = world(HALL, OptionKind::Centroid);
+        let guide = straight((1.0, 2.0), (9.0, 2.0));
+        let state = RobotState::rolling(Pose::new(2.0, 2.3, 0.4), 0.5);
+        let percept = Percept::first(state);
+        let tracker = Tracker::start(&guide, &state.pose);
+        let mut observation = [f32::NAN; GUIDE_OBSERVATION_LEN];
+        let view = GuideView { guide: &guide, next: None };
+        guide_observation(&workspace, &percept, &tracker, &view, &mut observation);
+        assert!(observation.iter().all(|entry| entry.abs() <= 1.5), "{observation:?}");
+        let mut absolute = [f32::NAN; ABSOLUTE_OBSERVATION_LEN];
+        absolute_observation(&percept, &guide, &mut absolute);
+        assert_eq!(&absolute[..2], &[2.0, 2.3], "the configuration");
+        assert!((absolute[4] + 0.3).abs() < 1e-6, "the vector to the nearest guide point: {absolute:?}");
+    }
+
+    #[test]
+    fn displacements_are_felt_in_the_frame_before_the_action() {
+        let before = Percept::first(RobotState::at_rest(Pose::new(1.0, 1.0, std::f64::consts::FRAC_PI_2)));
+        let command = PolarWaypoint { reach_m: 0.5, bearing_rad: 0.0, speed_mps: 1.0 };
+        let after = before.next(command, RobotState::at_rest(Pose::new(0.9, 1.4, 2.0)));
+        let [ahead, left, turn] = after.last_displacement;
+        assert!((ahead - 0.4).abs() < 1e-9 && (left - 0.1).abs() < 1e-9, "{ahead} ahead, {left} left");
+        assert!((turn - (2.0 - std::f64::consts::FRAC_PI_2)).abs() < 1e-9, "{turn}");
+        assert_eq!(after.last_command, command);
+    }
+
+    #[test]
+    fn a_tracker_goes_along_with_the_robot() {
+        let guide = straight((0.0, 0.0), (4.0, 0.0));
+        let mut tracker = Tracker::start(&guide, &Pose::new(0.0, 0.2, 0.0));
+        for (x, y) in [(0.5, 0.1), (1.5, -0.2), (2.5, 0.0)] {
+            tracker.update(&guide, &Pose::new(x, y, 0.0));
+            assert!((tracker.arc_m - x).abs() < 1e-9, "{tracker:?} at {x} m");
+            assert!((tracker.cross_track_m - y).abs() < 1e-9, "{tracker:?} beside {y} m");
+            assert!((tracker.arc_m + tracker.remaining_m - 4.0).abs() < 1e-9, "{tracker:?} of 4 m");
+        }
+    }
+}

@@ -232,3 +232,66 @@ fn planned_leg(
     let leg = Leg::new((rbvd, options), file.id, (file.from, file.to), file.guide, goal);
     Ok(PlannedLeg { leg: Arc::new(leg), learnt, reused: file.reused, on_arrival: file.on_arrival })
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::{self, HALL, SEALED};
+
+    fn saved(kind: OptionKind) -> (Arc<Plan>, tempfile::TempDir) {
+        let plan = drawn::plan(kind);
+        let map = map_hash(&plan.workspace.grid);
+        let rbvd = (*plan.abstraction.rbvd).clone();
+        let file = AbstractionFile::new(map, "drawn".to_owned(), kind, OptionSettings::default(), rbvd);
+        let folder = tempfile::tempdir().unwrap();
+        plan.save(folder.path(), &file).unwrap();
+        (plan, folder)
+    }
+
+    #[test]
+    fn a_plan_survives_a_round_trip() {
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            let (plan, folder) = saved(kind);
+            let read = Plan::load(folder.path(), (*plan.workspace.grid).clone()).unwrap();
+            assert_eq!(read.solution.query, plan.solution.query, "{kind:?}");
+            assert_eq!(*read.workspace.robot, *plan.workspace.robot, "{kind:?}");
+            for (read, written) in read.solution.legs.iter().zip(&plan.solution.legs) {
+                assert_eq!(read.leg.id, written.leg.id, "{kind:?}");
+                assert_eq!(read.leg.guide, written.leg.guide, "{}", written.leg.id);
+                assert_eq!(read.leg.target, written.leg.target, "{}", written.leg.id);
+                assert_eq!(read.leg.source, written.leg.source, "{}", written.leg.id);
+            }
+            assert_eq!(read.solution.legs.len(), plan.solution.legs.len(), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn a_plan_for_another_map_is_refused() {
+        let (_, folder) = saved(OptionKind::Centroid);
+        let (other, _) = drawn::world(SEALED, OptionKind::Centroid);
+        let error = Plan::load(folder.path(), (*other.grid).clone()).unwrap_err().to_string();
+        assert!(error.contains("plan.ron") && error.contains("another map"), "{error}");
+    }
+
+    #[test]
+    fn one_cell_or_one_metre_makes_another_map() {
+        let grid = |drawing: &str, resolution_m| OccupancyGrid::from_ascii(resolution_m, drawing).unwrap();
+        let hash = map_hash(&grid("##\n.#", 0.4));
+        assert_eq!(hash, map_hash(&grid("##\n.#", 0.4)), "the same map");
+        for other in [grid("##\n..", 0.4), grid("##\n.#", 0.5), grid("##\n?#", 0.4), grid("##.#", 0.4)] {
+            assert_ne!(hash, map_hash(&other), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn the_options_of_an_abstraction_are_made_again_the_same() {
+        let (_, abstraction) = drawn::world(HALL, OptionKind::Interface);
+        let rbvd = (*abstraction.rbvd).clone();
+        let settings = OptionSettings::default();
+        let file =
+            AbstractionFile::new("m".to_owned(), "drawn".to_owned(), OptionKind::Interface, settings, rbvd);
+        assert_eq!(file.abstraction().options, abstraction.options);
+    }
+}

@@ -227,7 +227,8 @@ impl<'a> Planner<'a> {
         };
         // On a short leg two crossing directions would leave no room for the way between them.
         let crosses = (candidate.end - candidate.start).norm() > CROSSING_M;
-        let crossing = |endpoint: Option<&Endpoint>, to| endpoint.filter(|_| crosses).and_then(|end| approach(end, to));
+        let crossing =
+            |endpoint: Option<&Endpoint>, to| endpoint.filter(|_| crosses).and_then(|end| approach(end, to));
         let start_heading = match id {
             LegId::First(_) | LegId::Direct => Some(self.query.start.heading),
             LegId::Option(option) => crossing(source, option.through().unwrap_or(option.to())),
@@ -276,4 +277,77 @@ fn state_near(rbvd: &Rbvd, point: Point) -> Option<StateId> {
     .filter_map(|cell| rbvd.state_of(cell).map(|state| ((frame.center(cell) - point).norm(), cell, state)))
     .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     .map(|(_, _, state)| state)
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::{HALL, RING, SEALED, along, world};
+
+    fn names(legs: &[Arc<Leg>]) -> String {
+        legs.iter().map(|leg| leg.id.to_string()).collect::<Vec<_>>().join(" ")
+    }
+
+    fn planner<'a>((workspace, abstraction): &'a (Workspace, Abstraction), query: Query) -> Planner<'a> {
+        let settings = SearchSettings::new(workspace);
+        Planner::new(workspace, abstraction, settings, query, [], Seed(1)).expect("both ends have a state")
+    }
+
+    #[test]
+    fn a_banned_leg_sends_the_plan_the_other_way_round() {
+        let world = world(RING, OptionKind::Interface);
+        let mut planner =
+            planner(&world, Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) });
+        let first = planner.plan(&|_| None, &()).expect("two ways lead round");
+        let option = first.iter().find(|leg| matches!(leg.id, LegId::Option(_))).expect("an option").id;
+        planner.ban(option);
+        let second = planner.plan(&|_| None, &()).expect("the other way");
+        assert!(second.iter().all(|leg| leg.id != option), "{} uses the banned {option}", names(&second));
+    }
+
+    #[test]
+    fn measured_costs_make_a_plan_change_its_way() {
+        let world = world(RING, OptionKind::Interface);
+        let query = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+        let first = planner(&world, query).plan(&|_| None, &()).expect("two ways lead round");
+        let option = first.iter().find(|leg| matches!(leg.id, LegId::Option(_))).expect("an option").id;
+        let slow = |id| (id == option).then_some(500.0);
+        let second = planner(&world, query).plan(&slow, &()).expect("the other way");
+        assert!(second.iter().all(|leg| leg.id != option), "{} uses the slow {option}", names(&second));
+    }
+
+    #[test]
+    fn guides_from_earlier_problems_are_kept() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let settings = SearchSettings::new(&workspace);
+        let option = abstraction.options.options()[0].id;
+        let ends = |id| abstraction.options.endpoint(id).center;
+        let spec = abstraction.options.get(option).expect("its own");
+        let (from, to) = (ends(spec.initiation), ends(spec.termination));
+        let known = crate::drawn::straight((from.x, from.y), (to.x, to.y));
+        let guides = [(LegId::Option(option), known.clone())];
+        let planner = Planner::new(&workspace, &abstraction, settings, along(), guides, Seed(1));
+        let mut planner = planner.expect("both ends have a state");
+        let legs = planner.plan(&|_| None, &()).expect("a way");
+        let leg = legs.iter().find(|leg| leg.id == LegId::Option(option)).expect("c:0-1 lies on the way");
+        assert_eq!(leg.guide, known, "planned again");
+    }
+
+    #[test]
+    fn sealed_rooms_have_no_plan_and_walls_have_no_state() {
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            let world = world(SEALED, kind);
+            let through = Query { start: Pose::new(2.0, 1.4, 0.0), goal: Pose::new(6.0, 1.4, 0.0) };
+            assert!(planner(&world, through).plan(&|_| None, &()).is_none(), "{kind:?}: through a wall");
+            let outside = Pose::new(-5.0, 1.0, 0.0);
+            let placed = |query| {
+                let settings = SearchSettings::new(&world.0);
+                Planner::new(&world.0, &world.1, settings, query, [], Seed(1)).map(|_| ())
+            };
+            assert_eq!(placed(Query { start: outside, ..through }), Err(Unplaced::Start), "{kind:?}");
+            assert_eq!(placed(Query { goal: outside, ..through }), Err(Unplaced::Goal), "{kind:?}");
+        }
+    }
 }

@@ -275,3 +275,98 @@ impl OptionPolicy {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawn::straight;
+
+    const EAST: ((f64, f64), (f64, f64)) = ((0.0, 0.0), (2.0, 0.0));
+
+    fn husky() -> RobotModel {
+        RobotModel::husky()
+    }
+
+    fn at(pose: Pose, guide: &GuidePath) -> (Pose, Tracker) {
+        (pose, Tracker::start(guide, &pose))
+    }
+
+    #[test]
+    fn waypoints_survive_the_way_to_the_world_and_back() {
+        for heading in [-3.0, -1.0, 0.0, 2.5] {
+            let pose = Pose::new(1.5, -2.0, heading);
+            for (x, y) in [(2.0, -2.0), (1.0, 3.0), (-4.0, -2.5)] {
+                let seen = PolarWaypoint::of(&pose, Point::new(x, y), 0.7);
+                let back = seen.to_world(&pose);
+                assert!((back - Point::new(x, y)).norm() < 1e-9, "({x}, {y}) from {heading} became {back:?}");
+                assert_eq!(seen.speed_mps, 0.7, "the speed is kept");
+            }
+        }
+    }
+
+    #[test]
+    fn looking_ahead_runs_on_into_the_next_guide_and_straight_past_the_last() {
+        let (guide, next) = (straight(EAST.0, EAST.1), straight((2.0, 0.0), (2.0, 1.0)));
+        let alone = GuideView { guide: &guide, next: None };
+        let followed = GuideView { guide: &guide, next: Some(&next) };
+        for (view, arc_m, x, y) in [
+            (alone, 1.5, 1.5, 0.0),
+            (alone, 3.0, 3.0, 0.0),
+            (followed, 1.5, 1.5, 0.0),
+            (followed, 2.5, 2.0, 0.5),
+            (followed, 4.0, 2.0, 2.0),
+        ] {
+            let ahead = view.ahead(arc_m).position;
+            assert!((ahead - Point::new(x, y)).norm() < 1e-9, "{arc_m} m ahead lies {ahead:?}");
+        }
+    }
+
+    #[test]
+    fn every_follower_turns_back_to_its_guide() {
+        let guide = straight(EAST.0, EAST.1);
+        let view = GuideView { guide: &guide, next: None };
+        for follower in Follower::candidates(&husky()) {
+            let bearing = |y: f64, heading: f64| {
+                let (pose, tracker) = at(Pose::new(0.5, y, heading), &guide);
+                let waypoint = follower.waypoint(&husky(), &pose, &tracker, &view);
+                assert_eq!(waypoint.reach_m, husky().waypoint_reach_m, "{follower:?} keeps its distance");
+                assert_eq!(waypoint.speed_mps, follower.speed_mps, "{follower:?} keeps its speed");
+                waypoint.bearing_rad
+            };
+            assert!(bearing(0.0, 0.0).abs() < 1e-9, "{follower:?} swerves on the guide");
+            assert!(bearing(0.3, 0.0) < -0.1, "{follower:?} leaves to the left");
+            assert!(bearing(-0.3, 0.0) > 0.1, "{follower:?} leaves to the right");
+            assert!(bearing(0.0, 1.0) < -0.5, "{follower:?} looks away");
+        }
+    }
+
+    #[test]
+    fn no_correction_is_the_follower_and_a_full_one_stays_within_its_share() {
+        let guide = straight(EAST.0, EAST.1);
+        let view = GuideView { guide: &guide, next: None };
+        let base = Follower::cautious(&husky());
+        let form = Form::Guide { base, correction: Correction { speed_mps: 0.6, bearing_rad: 0.8 } };
+        let (pose, tracker) = at(Pose::new(0.5, 0.2, 0.1), &guide);
+        let wanted = base.waypoint(&husky(), &pose, &tracker, &view);
+        assert_eq!(form.waypoint(&husky(), &pose, &tracker, &view, &[0.0, 0.0]), wanted, "no correction");
+        for (action, speed_mps, turn) in [([1.0, 1.0], 1.0, 0.8), ([-1.0, -1.0], 0.1, -0.8)] {
+            let corrected = form.waypoint(&husky(), &pose, &tracker, &view, &action);
+            assert_eq!(corrected.speed_mps, speed_mps, "the robot's limits bound {action:?}");
+            assert!((corrected.bearing_rad - wanted.bearing_rad - turn).abs() < 1e-9, "{action:?}");
+        }
+    }
+
+    #[test]
+    fn absolute_actions_are_displacements_in_the_world() {
+        let guide = straight(EAST.0, EAST.1);
+        let view = GuideView { guide: &guide, next: None };
+        let form = Form::Absolute { reach_m: 0.5 };
+        let (pose, tracker) = at(Pose::new(0.5, 0.2, 2.0), &guide);
+        for (action, x, y) in [([1.0, 0.0], 1.0, 0.2), ([0.0, -0.4], 0.5, 0.0), ([0.2, 0.2], 0.6, 0.3)] {
+            let point = form.waypoint(&husky(), &pose, &tracker, &view, &action).to_world(&pose);
+            assert!((point - Point::new(x, y)).norm() < 1e-6, "{action:?} leads to {point:?}");
+        }
+        let corner = form.waypoint(&husky(), &pose, &tracker, &view, &[1.0, 1.0]);
+        assert_eq!(corner.reach_m, husky().waypoint_reach_m, "no waypoint beyond the robot's reach");
+    }
+}

@@ -125,3 +125,47 @@ pub fn drive_chain<S: Simulator>(
     }
     run
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+    use sharp_sim::NoiseModel;
+    use sharp_space::Seed;
+
+    use super::*;
+    use crate::drawn::plan;
+
+    #[test]
+    fn without_noise_a_chain_of_followers_holds_and_ends_at_the_goal() {
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            let plan = plan(kind);
+            let legs = &plan.solution.legs;
+            let drivers: Vec<Driver<'_>> = legs
+                .iter()
+                .map(|planned| Driver { leg: &planned.leg, policy: &planned.learnt.policy, next: None })
+                .collect();
+            let start = RobotState::at_rest(plan.solution.query.start);
+            let mut vehicle = crate::learn::kinematic_vehicle(&plan.workspace, &NoiseModel::none(), true);
+            vehicle.reset(start, Seed(1), 0);
+            let run =
+                drive_chain(&plan.workspace, &mut vehicle, start, &drivers, &mut DecisionScratch::default());
+            assert_eq!(run.outcome, LegOutcome::Done, "{kind:?}: {run:?}");
+            assert!((0..legs.len()).all(|index| run.passed(index)), "{kind:?}: every leg held");
+            let end = vehicle.state().pose;
+            assert!(end.distance_m(&plan.solution.query.goal) < 0.4, "{kind:?} ends at {end:?}");
+            let time_s: f64 = run.times_s.iter().sum();
+            assert!((10.0..40.0).contains(&time_s), "{kind:?}: 8 m in {time_s} s");
+        }
+    }
+
+    #[test]
+    fn a_leg_counts_as_passed_only_if_the_next_was_begun_or_the_goal_reached() {
+        let entries = vec![RobotState::at_rest(sharp_space::Pose::new(0.0, 0.0, 0.0)); 2];
+        for (outcome, passed) in
+            [(LegOutcome::Done, [true, true, false]), (LegOutcome::Contact, [true, false, false])]
+        {
+            let run = ChainRun { entries: entries.clone(), times_s: vec![1.0; 2], outcome };
+            assert_eq!([0, 1, 2].map(|index| run.passed(index)), passed, "{outcome:?}");
+        }
+    }
+}

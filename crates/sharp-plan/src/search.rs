@@ -249,3 +249,85 @@ fn is_centroid_elsewhere(endpoint: &Endpoint, state: StateId) -> bool {
 fn other_state(states: &[StateId], near: StateId) -> StateId {
     states.iter().copied().find(|&state| state != near).unwrap_or(near)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawn::{HALL, RING, SEALED, along, world};
+    use crate::planner::Query;
+
+    fn graph(drawing: &str, kind: OptionKind, query: Query) -> OptionGraph {
+        let (_, abstraction) = world(drawing, kind);
+        let place = |pose: Pose| (pose, abstraction.rbvd.state_at(pose.position).expect("a state"));
+        OptionGraph::new(&abstraction.rbvd, &abstraction.options, place(query.start), place(query.goal))
+    }
+
+    fn straight_m(leg: &Candidate) -> f64 {
+        (leg.end - leg.start).norm()
+    }
+
+    fn names(legs: &[LegId]) -> String {
+        legs.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The names of the shortest plan; first and last legs past a centroid cost 10 m more.
+    fn shortest(drawing: &str, kind: OptionKind, query: Query) -> Option<String> {
+        let cost = |leg: &Candidate| straight_m(leg) + if leg.is_shortcut { 10.0 } else { 0.0 };
+        graph(drawing, kind, query).search(1.0, cost, |_, _| 0.0).map(|(_, legs)| names(&legs))
+    }
+
+    #[test]
+    fn a_hall_is_crossed_from_region_to_region() {
+        let centroid = shortest(HALL, OptionKind::Centroid, along());
+        assert_eq!(centroid.as_deref(), Some("first:0 c:0-1 c:1-2 last:2"));
+        let interface = shortest(HALL, OptionKind::Interface, along());
+        assert_eq!(interface.as_deref(), Some("first:0 i:0-1-2 last:1"));
+    }
+
+    #[test]
+    fn within_a_state_one_leg_is_enough() {
+        let nearby = Query { start: Pose::new(1.0, 2.0, 0.0), goal: Pose::new(2.5, 2.2, 0.0) };
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            assert_eq!(shortest(HALL, kind, nearby).as_deref(), Some("first:goal"), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn sealed_rooms_have_no_plan() {
+        let through = Query { start: Pose::new(2.0, 1.4, 0.0), goal: Pose::new(6.0, 1.4, 0.0) };
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            assert_eq!(shortest(SEALED, kind, through), None, "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn an_impossible_leg_or_join_sends_the_plan_the_other_way_round() {
+        let across = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+        let graph = graph(RING, OptionKind::Centroid, across);
+        let (length_m, legs) = graph.search(1.0, straight_m, |_, _| 0.0).expect("a ring has two ways");
+        let banned = |leg: &Candidate| if legs.contains(&leg.id) { f64::INFINITY } else { straight_m(leg) };
+        let (detour_m, others) = graph.search(1.0, banned, |_, _| 0.0).expect("the other way");
+        assert!(detour_m > length_m, "{detour_m} m is no detour from {length_m} m");
+        assert!(legs.iter().all(|leg| !others.contains(leg)), "{} keeps a banned leg", names(&others));
+        let broken = |before: &Candidate, after: &Candidate| {
+            let joins = legs.windows(2).any(|pair| pair == [before.id, after.id]);
+            if joins { f64::INFINITY } else { 0.0 }
+        };
+        let (_, rejoined) = graph.search(1.0, straight_m, broken).expect("the other way");
+        assert!(rejoined != legs, "{} keeps a join that is impossible", names(&rejoined));
+        assert!(graph.search(1.0, |_| f64::INFINITY, |_, _| 0.0).is_none(), "no leg is possible");
+    }
+
+    #[test]
+    fn the_cheapest_plan_agrees_with_an_uninformed_search() {
+        let across = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            let graph = graph(RING, kind, across);
+            let turn = |before: &Candidate, after: &Candidate| f64::from((before.to.0 + after.to.0) % 3);
+            let informed = graph.search(1.0, straight_m, turn).map(|found| found.0);
+            // At an endless top speed the heuristic knows nothing.
+            let blind = graph.search(f64::INFINITY, straight_m, turn).map(|found| found.0);
+            assert_eq!(informed, blind, "{kind:?}: the heuristic overestimates");
+        }
+    }
+}

@@ -417,3 +417,89 @@ pub const fn kind_name(kind: OptionKind) -> &'static str {
         OptionKind::Interface => "interface",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::drawn::{HALL, SEALED, along, world};
+    use sharp_space::Pose;
+
+    fn settings(workspace: &Workspace) -> SolveSettings {
+        let noise = NoiseModel::by_name("nominal").expect("a built-in noise");
+        let settings = SolveSettings::new(workspace, LearningMode::Fast, noise, Seed(1));
+        let learn = LearnSettings { screening_episodes: 50, certify_episodes: 200, ..settings.learn };
+        SolveSettings { learn, repair_episodes: 100, verify_episodes: 100, ..settings }
+    }
+
+    /// Notes what happens and stops when told to.
+    #[derive(Default)]
+    struct Notes {
+        phases: Mutex<Vec<Phase>>,
+        learnt: Mutex<Vec<LegId>>,
+        stops: bool,
+    }
+
+    impl Monitor for Notes {
+        fn phase(&self, phase: Phase) {
+            self.phases.lock().expect("no other panic").push(phase);
+        }
+        fn learnt(&self, leg: &Leg, _: &Learnt) {
+            self.learnt.lock().expect("no other panic").push(leg.id);
+        }
+        fn should_stop(&self) -> bool {
+            self.stops
+        }
+    }
+
+    #[test]
+    fn a_hall_is_solved_and_the_options_stay_in_the_library() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let (mut library, notes) = (OptionLibrary::in_memory(), Notes::default());
+        let outcome = solve(&workspace, &abstraction, along(), &settings(&workspace), &mut library, &notes)
+            .expect("no files");
+        let Outcome::Solved(solution) = outcome else { panic!("{outcome:?}") };
+        assert_eq!(solution.legs.len(), 4, "first, two options, last");
+        assert_eq!(solution.reuse(), (2, 0), "nothing was there before");
+        assert!(solution.predicted.rate() > 0.9, "an open hall holds {:?}", solution.predicted);
+        assert_eq!(library.len(), 2, "only options are kept");
+        let phases = notes.phases.into_inner().expect("no other panic");
+        assert_eq!((phases.first(), phases.last()), (Some(&Phase::Search), Some(&Phase::Done)), "{phases:?}");
+        assert!(notes.learnt.into_inner().expect("no other panic").len() >= 4, "every leg was told");
+    }
+
+    #[test]
+    fn no_plan_is_an_outcome_with_a_reason() {
+        let (workspace, abstraction) = world(SEALED, OptionKind::Interface);
+        let through = Query { start: Pose::new(2.0, 1.4, 0.0), goal: Pose::new(6.0, 1.4, 0.0) };
+        for (query, needle) in [
+            (through, "no sequence of options"),
+            (Query { start: Pose::new(-9.0, 0.0, 0.0), ..through }, "start lies in no abstract state"),
+            (Query { goal: Pose::new(-9.0, 0.0, 0.0), ..through }, "goal lies in no abstract state"),
+        ] {
+            let mut library = OptionLibrary::in_memory();
+            let outcome = solve(&workspace, &abstraction, query, &settings(&workspace), &mut library, &());
+            let Ok(Outcome::NoPlan(reason)) = outcome else { panic!("{outcome:?}") };
+            assert!(reason.contains(needle), "{reason:?} does not say {needle:?}");
+        }
+    }
+
+    #[test]
+    fn a_stop_is_heard() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let notes = Notes { stops: true, ..Notes::default() };
+        let mut library = OptionLibrary::in_memory();
+        let outcome = solve(&workspace, &abstraction, along(), &settings(&workspace), &mut library, &notes);
+        assert!(matches!(outcome, Ok(Outcome::Stopped)), "{outcome:?}");
+    }
+
+    #[test]
+    fn legs_are_counted_only_where_they_were_entered() {
+        let at = |count| vec![RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)); count];
+        let run = |count, outcome| ChainRun { entries: at(count), times_s: vec![1.0; count], outcome };
+        let runs = [run(2, LegOutcome::Done), run(2, LegOutcome::Contact), run(1, LegOutcome::TimedOut)];
+        let tally = |episodes, successes| Tally { episodes, successes };
+        assert_eq!(tallies(&runs, 2), [tally(3, 2), tally(2, 1)]);
+    }
+}

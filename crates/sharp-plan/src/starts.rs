@@ -127,3 +127,48 @@ impl<'a> ViabilityProbe<'a> {
             != LegOutcome::Contact
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::{HALL, along, legs, world};
+
+    fn spread(count: usize) -> (Workspace, Pose, Starts) {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let leg = &legs(&workspace, &abstraction, along())[1];
+        let starts = Starts::spread(&workspace, leg, &StartSpread::default(), count, Seed(3));
+        (workspace, leg.guide.start(), starts)
+    }
+
+    #[test]
+    fn spread_states_lie_around_the_guides_start_and_are_free() {
+        let (workspace, center, starts) = spread(200);
+        assert_eq!(starts.broad.len(), 200, "an open hall has enough");
+        for state in &starts.broad {
+            assert!(workspace.checker.is_free(state.pose), "{state:?} touches a wall");
+            assert!(state.pose.distance_m(&center) <= 0.3, "{state:?} lies too far out");
+            assert!((0.0..=0.6).contains(&state.speed_mps()), "{state:?} is too fast");
+        }
+        let turned = starts.broad.iter().filter(|state| state.pose.heading.radians().abs() > 0.1).count();
+        assert!(turned > 50, "only {turned} of 200 headings differ from the guide's");
+        assert_eq!(spread(200).2.broad, starts.broad, "equal seeds");
+    }
+
+    #[test]
+    fn half_of_the_draws_are_arrivals() {
+        let arrival = RobotState::at_rest(Pose::new(9.0, 1.0, 1.0));
+        let starts = Starts::exactly(RobotState::at_rest(along().start)).with_arrivals(vec![arrival]);
+        let mut rng = Seed(1).stream("draw", 0);
+        let arrivals = (0..1000).filter(|_| starts.draw(&mut rng) == arrival).count();
+        assert!((420..580).contains(&arrivals), "{arrivals} of 1000");
+    }
+
+    #[test]
+    fn a_leg_from_the_start_begins_there() {
+        let state = RobotState::at_rest(along().start);
+        let mut rng = Seed(1).stream("draw", 0);
+        assert!((0..10).all(|_| Starts::exactly(state).draw(&mut rng) == state), "nowhere else");
+    }
+}

@@ -103,3 +103,65 @@ impl Environment for LegTask {
         Step { reward: reward as f32, terminated, truncated: !terminated && self.actions >= horizon, success }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_guide::{PseudoReward, ShapedReward};
+    use sharp_options::OptionKind;
+    use sharp_rl::check_environment;
+    use sharp_sim::RobotState;
+
+    use super::*;
+    use crate::drawn::{HALL, along, legs, world};
+    use crate::policy::{Correction, Follower};
+
+    fn forms(workspace: &Workspace) -> [(Form, RewardMode); 2] {
+        let base = Follower::cautious(&workspace.robot);
+        let correction = Correction { speed_mps: 0.5, bearing_rad: 0.8 };
+        [
+            (Form::Guide { base, correction }, RewardMode::Shaped(ShapedReward::default())),
+            (Form::Absolute { reach_m: 0.5 }, RewardMode::Paper(PseudoReward::default())),
+        ]
+    }
+
+    fn task(workspace: &Workspace, leg: &Arc<Leg>, (form, reward): (Form, RewardMode)) -> LegTask {
+        let starts = Arc::new(Starts::exactly(RobotState::at_rest(leg.guide.start())));
+        let noise = NoiseModel::by_name("nominal").expect("a built-in noise");
+        LegTask::new(workspace, (Arc::clone(leg), None), form, reward, starts, (&noise, Seed(1)))
+    }
+
+    #[test]
+    fn both_forms_keep_the_contract_of_an_environment() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let leg = &legs(&workspace, &abstraction, along())[1];
+        for form in forms(&workspace) {
+            let checked =
+                check_environment(&mut task(&workspace, leg, form), &mut Seed(1).stream("check", 0));
+            assert_eq!(checked, Ok(()), "{form:?}");
+        }
+    }
+
+    #[test]
+    fn the_base_follower_succeeds_and_standing_still_runs_out_of_time() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let leg = &legs(&workspace, &abstraction, along())[1];
+        let horizon = leg.horizon_actions(crate::SLOWEST_REACH_M);
+        for (form, succeeds) in forms(&workspace).into_iter().zip([true, false]) {
+            let mut task = task(&workspace, leg, form);
+            let mut observation = vec![0.0; form.0.observation_len()];
+            task.reset(&mut Seed(1).stream("reset", 0), &mut observation);
+            let mut steps = 1;
+            let mut step = task.step(&[0.0, 0.0], &mut observation);
+            while !(step.terminated || step.truncated) {
+                step = task.step(&[0.0, 0.0], &mut observation);
+                steps += 1;
+            }
+            assert_eq!((step.success, step.terminated), (succeeds, succeeds), "{form:?} after {steps} steps");
+            assert_eq!(step.truncated, !succeeds, "{form:?}: time out is no end");
+            assert!(
+                steps <= horizon && (succeeds || steps == horizon),
+                "{form:?}: {steps} of {horizon} steps"
+            );
+        }
+    }
+}
