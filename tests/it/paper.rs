@@ -1,4 +1,4 @@
-//! What the paper promises, as properties of generated floor plans: Theorem 4.1 and Definition 7,
+//! What the paper promises, as properties of generated floor plans: Theorem 4.1 and Definition 8,
 //! for both kinds of options and both robots.
 
 use std::collections::BTreeSet;
@@ -84,7 +84,7 @@ fn options_compose_wherever_adjacent_states_lead() {
     });
 }
 
-/// Definition 7: from centre to centre, gaps under t, every point where the option may be.
+/// Definition 8: from centre to centre, gaps under t, every point where the option may be.
 fn assert_guide(guide: &GuidePath, option: &OptionSpec, world: &World, name: &str) {
     let (rbvd, options) = (&world.abstraction.rbvd, &world.abstraction.options);
     let (from, to) =
@@ -113,7 +113,7 @@ fn steering(robot: &RobotModel) -> Steering {
 }
 
 #[test]
-fn guide_paths_fulfil_definition_7() {
+fn guide_paths_fulfil_definition_8() {
     let (mut guided, mut tried) = (0, 0);
     for_every_world(|world, name| {
         let steering = steering(&world.workspace.robot);

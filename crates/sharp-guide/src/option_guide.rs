@@ -1,4 +1,4 @@
-//! Option guides (Definition 6): everything that teaches an option its policy.
+//! Option guides (Definition 7): everything that teaches an option its policy.
 
 use sharp_motion::Steering;
 use sharp_options::{AllowedRule, Endpoint, OptionSet, OptionSpec};
@@ -74,7 +74,7 @@ impl OptionGuide {
         Ok(Self { option: *option, initiation, termination, path, reward: PseudoReward::default() })
     }
 
-    /// Which case of Definition 8 holds at `pose`.
+    /// Which case of Definition 9 holds at `pose`.
     #[must_use]
     pub fn place(&self, pose: &Pose, abstraction: &Abstraction<'_>) -> Place {
         let Abstraction { rbvd, options, rule } = *abstraction;

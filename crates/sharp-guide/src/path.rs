@@ -1,4 +1,4 @@
-//! Guide paths (Definition 7) and projections onto them.
+//! Guide paths (Definition 8) and projections onto them.
 
 use serde::{Deserialize, Serialize};
 use sharp_space::{Heading, Point, Pose};
@@ -157,7 +157,7 @@ impl GuidePath {
         self.poses[segment].interpolate(&self.poses[segment + 1], share)
     }
 
-    /// n(x) of Definition 8: the index of the pose nearest to `point`, the first of equals.
+    /// n(x) of Definition 9: the index of the pose nearest to `point`, the first of equals.
     #[must_use]
     pub fn nearest(&self, point: Point) -> usize {
         let distance = |i: &usize| (self.poses[*i].position - point).norm_squared();

@@ -75,7 +75,7 @@ pub enum NoGuide {
     },
 }
 
-/// Plans the guide path of an option and certifies it (Definition 7).
+/// Plans the guide path of an option and certifies it (Definition 8).
 ///
 /// The result starts and ends at the request's positions, keeps gaps under the spacing, stays in
 /// allowed cells, and the robot's outline is free all along it. For a robot with a turning radius no

@@ -1,11 +1,11 @@
-//! Pseudo-rewards: the paper's three cases (Definition 8) and the shaped reward that learns faster.
+//! Pseudo-rewards: the paper's three cases (Definition 9) and the shaped reward that learns faster.
 
 use serde::{Deserialize, Serialize};
 use sharp_space::Pose;
 
 use crate::path::GuidePath;
 
-/// Where a pose lies as seen from an option: the three cases of Definition 8.
+/// Where a pose lies as seen from an option: the three cases of Definition 9.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// x ∈ β.
@@ -16,7 +16,7 @@ pub enum Place {
     Allowed,
 }
 
-/// R of Definition 8.
+/// R of Definition 9.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PseudoReward {
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn the_three_cases_of_definition_8() {
+    fn the_three_cases_of_definition_9() {
         let (reward, guide, pose) = (PseudoReward::default(), straight(), Pose::new(4.2, 3.0, 1.0));
         assert_eq!(reward.value(&guide, &pose, Place::Termination), 1000.0, "r_t");
         assert_eq!(reward.value(&guide, &pose, Place::Astray), -100.0, "r_p");

@@ -15,7 +15,7 @@ pub enum GuidePlanner {
 /// The settings of [`plan_guide`](crate::plan_guide).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuideSettings {
-    /// The threshold t of Definition 7, metres.
+    /// The threshold t of Definition 8, metres.
     pub spacing_m: f64,
     /// Which planner.
     pub planner: GuidePlanner,

@@ -1,4 +1,4 @@
-//! Guides on generated floor plans: Definition 7 as a property, and how often there is a guide.
+//! Guides on generated floor plans: Definition 8 as a property, and how often there is a guide.
 
 use rand::RngExt;
 use sharp_guide::{
@@ -43,7 +43,7 @@ fn pairs(checker: &FootprintChecker, seed: u64) -> Vec<(Point, Point)> {
     drawn.into_iter().filter(|(a, b)| (3.0..9.0).contains(&(a - b).norm())).take(12).collect()
 }
 
-/// Everything that Definition 7 and the certificate promise.
+/// Everything that Definition 8 and the certificate promise.
 fn check_guide(guide: &GuidePath, request: &GuideRequest<'_>, checker: &FootprintChecker, robot: &Robot) {
     let frame: &GridFrame = checker.field().frame();
     let (first, last) = (guide.start().position, guide.end().position);
@@ -95,7 +95,7 @@ fn plan_everywhere(robot: &Robot, settings: &GuideSettings) -> (usize, Vec<(Floo
 }
 
 #[test]
-fn ridge_guides_fulfil_definition_7_nearly_everywhere() {
+fn ridge_guides_fulfil_definition_8_nearly_everywhere() {
     for robot in robots() {
         let (asked, failures) = plan_everywhere(&robot, &GuideSettings::default());
         println!("{}: {} of {asked} failed: {failures:?}", robot.name, failures.len());

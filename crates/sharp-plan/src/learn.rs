@@ -114,7 +114,7 @@ pub enum LearnFailure {
 /// Which pseudo-reward teaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RewardMode {
-    /// Definition 8; contact blocks the robot and the episode goes on.
+    /// Definition 9; contact blocks the robot and the episode goes on.
     Paper(PseudoReward),
     /// Progress along the guide; contact ends the episode.
     Shaped(ShapedReward),

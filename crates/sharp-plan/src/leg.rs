@@ -60,7 +60,7 @@ impl fmt::Display for LegId {
 /// Where a leg ends.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
-    /// An endpoint region β (definitions 2 and 4).
+    /// An endpoint region β (definitions 3 and 5).
     Endpoint(Endpoint),
     /// The goal configuration, heading free.
     Goal {
@@ -145,7 +145,7 @@ impl Leg {
     }
 
     /// Returns true if a robot at `pose` is where the leg may be: the complement of the second case
-    /// of definition 8. A point without a state (too near to a wall) does not count as straying.
+    /// of definition 9. A point without a state (too near to a wall) does not count as straying.
     #[must_use]
     pub fn is_allowed(&self, pose: &Pose) -> bool {
         let state = self.rbvd.state_at(pose.position);
