@@ -53,7 +53,7 @@ fn ends(world: &World, id: LegId) -> (Option<EndpointId>, Option<EndpointId>) {
     }
 }
 
-/// β_i = I_{i+1} from the start to the goal.
+/// `β_i = I_{i+1}` from the start to the goal.
 fn assert_composes(world: &World, legs: &[LegId], name: &str) {
     for pair in legs.windows(2) {
         let (beta, initiation) = (ends(world, pair[0]).1, ends(world, pair[1]).0);

@@ -242,7 +242,7 @@ impl Labels {
     /// Criticality of every pixel: its visits against those around it; 0 where the robot cannot be.
     ///
     /// This is the paper's μ with the reference density taken locally: a share of plans through a
-    /// place, against what a uniform density within [`SURROUND_M`] would give. With one reference
+    /// place, against what a uniform density within `SURROUND_M` would give. With one reference
     /// for the whole map only the busiest doors are critical, and a quiet room has no region.
     #[must_use]
     pub fn criticality(&self) -> Vec<f32> {
