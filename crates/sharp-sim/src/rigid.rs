@@ -1,8 +1,9 @@
 //! The three-dimensional cross-check: a chassis on four motor-driven wheels on rapier3d.
 //!
-//! Nothing of the wheel law is in here: friction between balls and floor moves the robot, and
-//! gravity holds it down. The skid ratio and the turning radius that the other two simulators
-//! compute come out of the contacts. Only with the feature `rigid3d`, and several times slower.
+//! It shares the limits of commands with the other simulators, but not the wheel law: friction
+//! between balls and floor moves the robot, and gravity holds it down. The skid ratio and the turning
+//! radius that the others compute come out of the contacts. Only with the feature `rigid3d`, and
+//! several times slower.
 
 use std::fmt;
 use std::sync::Arc;
