@@ -43,7 +43,7 @@ pub use plan::{AbstractionFile, Plan, map_hash};
 pub use planner::{Abstraction, Planner, Query, SearchSettings, Unplaced};
 pub use policy::{Correction, DecisionScratch, Follower, Form, GuideView, OptionPolicy, PolarWaypoint, Rule};
 pub use rollout::{ChainRun, Driver, LegEnd, LegOutcome, drive_chain};
-pub use search::{Candidate, OptionCost, OptionGraph};
+pub use search::{Candidate, OptionGraph};
 pub use sharp::{Monitor, Outcome, Phase, PlannedLeg, Solution, SolveSettings, kind_name, solve};
 pub use starts::{StartSpread, Starts};
 pub use stats::Tally;

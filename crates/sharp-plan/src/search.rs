@@ -10,31 +10,11 @@ use std::collections::BTreeMap;
 
 use petgraph::algo::astar;
 use petgraph::graph::{DiGraph, NodeIndex};
-use serde::{Deserialize, Serialize};
 use sharp_options::{Endpoint, EndpointId, EndpointSite, OptionKind, OptionSet, OptionSpec};
 use sharp_rbvd::{Rbvd, StateId};
 use sharp_space::{Point, Pose};
 
 use crate::leg::LegId;
-
-/// The cost of a leg, seconds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum OptionCost {
-    /// Computed from a length; before anything was learnt.
-    Estimated(f64),
-    /// Mean simulated time of the learnt policy, weighed with its success.
-    Measured(f64),
-}
-
-impl OptionCost {
-    /// The cost, seconds.
-    #[must_use]
-    pub const fn seconds(&self) -> f64 {
-        match self {
-            Self::Estimated(seconds) | Self::Measured(seconds) => *seconds,
-        }
-    }
-}
 
 /// A leg that the search may choose, before it has a guide.
 #[derive(Clone, Debug, PartialEq)]
