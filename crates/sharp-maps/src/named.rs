@@ -64,7 +64,8 @@ mod tests {
                 map.problems.iter().enumerate().flat_map(|(n, p)| [(n, p.start), (n, p.goal)])
             {
                 let clearance = field.clearance_lower_bound(pose.position);
-                assert!(clearance >= 0.7, "{} P{}: {pose:?} has {clearance} m", map.name, number + 1);
+                // The Husky's corners reach 0.60 m from its centre: it can turn round everywhere.
+                assert!(clearance >= 0.65, "{} P{}: {pose:?} has {clearance} m", map.name, number + 1);
             }
         }
     }
@@ -84,6 +85,7 @@ mod tests {
             }
         }
     }
+
     #[test]
     fn doors_for_the_limo_turn_the_husky_away() {
         for map in maps().take(4) {
