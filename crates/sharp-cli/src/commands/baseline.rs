@@ -5,20 +5,20 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::{
-    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, Query, RoutePlanner, Rrt, Sac, SacBudget,
-    Tally, Track, TrackSettings, Workspace, compare,
+    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, Query,
+    RoutePlanner, Rrt, Sac, SacBudget, Tally, Track, TrackSettings, Workspace, compare,
 };
 use sharp_sim::{NoiseModel, SimulatorKind};
 use sharp_space::Seed;
 
 use crate::args::{Baseline, Collisions, Method};
+use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{Stopwatch, is_interrupted, spinner};
 use crate::report::{DecisionTimes, MapReport};
-use crate::input;
 
 /// Samples of one RRT plan: enough for 75 m; one that finds nothing has failed.
-const RRT_ITERATIONS: usize = 400_000;
+const RRT_ITERATIONS: usize = 30_000;
 /// Wall time that the paper gives its baselines, seconds.
 const TIME_LIMIT_S: f64 = 2400.0;
 /// Longest crossing of a flat policy where no path tells, simulated seconds.
@@ -84,8 +84,9 @@ pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failur
     let mut stopwatch = Stopwatch::start();
     stopwatch.enter("load");
     let limit_s = args.time_limit.unwrap_or(TIME_LIMIT_S);
-    let limit = Duration::try_from_secs_f64(limit_s)
-        .map_err(|_| Failure::new("USAGE", format!("--time-limit is {limit_s}, expected a number of seconds from 0 on")))?;
+    let limit = Duration::try_from_secs_f64(limit_s).map_err(|_| {
+        Failure::new("USAGE", format!("--time-limit is {limit_s}, expected a number of seconds from 0 on"))
+    })?;
     let deadline = Instant::now().checked_add(limit);
     let map = input::map(&args.map)?;
     let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
@@ -129,14 +130,20 @@ fn comparison(args: &Baseline, noise: NoiseModel, seed: u64) -> Result<Compariso
 
 impl Bench<'_> {
     /// Prepares the system and lets it drive; `None` if no path leads to the goal.
-    fn measure(&self, stopwatch: &mut Stopwatch, stop: &(dyn Fn() -> bool + Sync)) -> Result<Option<Measured>, Failure> {
+    fn measure(
+        &self,
+        stopwatch: &mut Stopwatch,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<Measured>, Failure> {
         let Self { args, workspace, query, seed, .. } = self;
-        if args.method == Method::Rrt {
-            let settings = RrtSettings { budget: Budget { iterations: RRT_ITERATIONS }, ..RrtSettings::default() };
-            return Ok(Some(self.drive(&Rrt { workspace, query: *query, settings, seed: *seed }, stopwatch, stop)));
-        }
         stopwatch.enter("plan");
         let planner = RoutePlanner::new(workspace);
+        if args.method == Method::Rrt {
+            let settings =
+                RrtSettings { budget: Budget { iterations: RRT_ITERATIONS }, ..RrtSettings::default() };
+            let rrt = Rrt { workspace, planner: &planner, query: *query, settings, seed: *seed };
+            return Ok(Some(self.drive(&rrt, stopwatch, stop)));
+        }
         let route = planner.plan(query);
         stopwatch.stop();
         if args.method == Method::Sac {
@@ -146,10 +153,24 @@ impl Bench<'_> {
         let Some(route) = route else { return Ok(None) };
         let robot = &workspace.robot;
         Ok(Some(if args.method == Method::Track {
-            self.drive(&Track { workspace, planner: &planner, query: *query, route, settings: TrackSettings::new(robot) }, stopwatch, stop)
+            self.drive(
+                &Track {
+                    workspace,
+                    planner: &planner,
+                    query: *query,
+                    route,
+                    settings: TrackSettings::new(robot),
+                },
+                stopwatch,
+                stop,
+            )
         } else {
             let settings = MppiSettings::new(robot);
-            self.drive(&Mppi { workspace, planner: &planner, query: *query, route, settings, seed: *seed }, stopwatch, stop)
+            self.drive(
+                &Mppi { workspace, planner: &planner, query: *query, route, settings, seed: *seed },
+                stopwatch,
+                stop,
+            )
         }))
     }
 
@@ -168,7 +189,12 @@ impl Bench<'_> {
         Ok(Measured { env_steps: learnt.env_steps(), gradient_steps: learnt.gradient_steps(), ..driven })
     }
 
-    fn drive(&self, system: &dyn System, stopwatch: &mut Stopwatch, stop: &(dyn Fn() -> bool + Sync)) -> Measured {
+    fn drive(
+        &self,
+        system: &dyn System,
+        stopwatch: &mut Stopwatch,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Measured {
         stopwatch.enter("drive");
         let begun = Instant::now();
         let clock_us = || begun.elapsed().as_secs_f64() * 1e6;
@@ -178,7 +204,13 @@ impl Bench<'_> {
         Measured { driven, ..Measured::default() }
     }
 
-    fn report(&self, seed: u64, map: MapReport, measured: Option<&Measured>, watch: &Stopwatch) -> BaselineReport {
+    fn report(
+        &self,
+        seed: u64,
+        map: MapReport,
+        measured: Option<&Measured>,
+        watch: &Stopwatch,
+    ) -> BaselineReport {
         let nothing = Measured::default();
         let Measured { driven, env_steps, gradient_steps } = measured.unwrap_or(&nothing);
         let ended = |end: EpisodeEnd| driven.iter().filter(|one| one.episode.end == end).count() as u32;
@@ -223,7 +255,8 @@ impl Bench<'_> {
 }
 
 fn decision_times(driven: &[Driven]) -> DecisionTimes {
-    let mut times: Vec<f64> = driven.iter().flat_map(|one| one.episode.decisions_us.iter().copied()).collect();
+    let mut times: Vec<f64> =
+        driven.iter().flat_map(|one| one.episode.decisions_us.iter().copied()).collect();
     times.sort_by(f64::total_cmp);
     let quantile = |q: f64| {
         let last = times.len().saturating_sub(1);

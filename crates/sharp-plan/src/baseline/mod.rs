@@ -198,7 +198,7 @@ impl<'a> Drive<'a> {
             }
             Readiness::NoWay => {
                 self.driven.plan_us += prepared_us - before_us;
-                return Some(EpisodeEnd::Lost);
+                return self.give_way();
             }
         }
         let command = pilot.decide(&state);
@@ -220,10 +220,23 @@ impl<'a> Drive<'a> {
         }
         if report.contact {
             // A forward-only robot with its nose at a wall can do nothing else.
-            let report = self.vehicle.back_off(self.workspace.robot.recovery_reverse_m);
-            episode.time_s += report.time_s;
-            episode.path_m += report.path_m;
+            self.back_off();
         }
         None
+    }
+
+    /// Without a way on: the end, or where walls may be touched another step back.
+    fn give_way(&mut self) -> Option<EpisodeEnd> {
+        if self.contact_ends || self.plans == 0 {
+            return Some(EpisodeEnd::Lost);
+        }
+        self.back_off();
+        None
+    }
+
+    fn back_off(&mut self) {
+        let report = self.vehicle.back_off(self.workspace.robot.recovery_reverse_m);
+        self.driven.episode.time_s += report.time_s;
+        self.driven.episode.path_m += report.path_m;
     }
 }

@@ -89,8 +89,10 @@ impl Baseline for Mppi<'_> {
         Box::new(MppiPilot {
             workspace,
             settings,
-            on_route: OnRoute::new(planner, *query, route.clone()),
+            on_route: OnRoute::new(planner, *query, route.clone(), settings.base.speed),
             model: Model::new(&workspace.robot),
+            // The last disc ends at the nose, so a corner is a half width ahead of and beside its centre.
+            corner_m: (std::f64::consts::SQRT_2 - 1.0) * workspace.robot.footprint.half_width_m(),
             mean: vec![Push::default(); settings.horizon],
             seed: seed.child("mppi", episode),
             decisions: 0,
@@ -122,6 +124,8 @@ struct MppiPilot<'a> {
     settings: &'a MppiSettings,
     on_route: OnRoute<'a>,
     model: Model,
+    /// How far the outline's corners stick out of the discs beside which room is measured, metres.
+    corner_m: f64,
     /// The sequence that the next decision begins with.
     mean: Vec<Push>,
     seed: Seed,
@@ -144,9 +148,9 @@ impl Pilot for MppiPilot<'_> {
         let costs: Vec<f64> =
             samples.chunks(self.settings.horizon).map(|pushes| self.cost(state, pushes)).collect();
         self.mean = weighted_mean(&samples, &costs, self.settings);
-        let OnRoute { route, tracker, .. } = &self.on_route;
-        let base = self.settings.base.waypoint(self.workspace, route, tracker, state);
-        let command = self.mean[0].applied(&self.workspace.robot, base);
+        let (robot, on_route) = (&self.workspace.robot, &self.on_route);
+        let base = self.settings.base.waypoint(robot, &state.pose, &on_route.tracker, on_route);
+        let command = self.mean[0].applied(robot, base);
         self.mean.rotate_left(1);
         *self.mean.last_mut().expect("a sequence has actions") = Push::default();
         command
@@ -172,24 +176,25 @@ impl MppiPilot<'_> {
 
     /// The cost of `pushes` from `state`: seconds of the way that is left undone, and what it risked.
     fn cost(&self, state: &RobotState, pushes: &[Push]) -> f64 {
-        let Self { workspace, settings, on_route: OnRoute { route, tracker, .. }, .. } = self;
+        let Self { workspace, settings, on_route, .. } = self;
+        let robot = &workspace.robot;
         let action_s = ActionSettings::default().action_s;
-        let (mut state, mut tracker) = (*state, *tracker);
+        let (mut state, mut tracker) = (*state, on_route.tracker);
         let (begun_m, mut cost) = (tracker.arc_m, 0.0);
         for (number, push) in pushes.iter().enumerate() {
-            let base = settings.base.waypoint(workspace, route, &tracker, &state);
-            let command = push.applied(&workspace.robot, base);
+            let base = settings.base.waypoint(robot, &state.pose, &tracker, on_route);
+            let command = push.applied(robot, base);
             if !self.model.act(&mut state, command, |at| self.is_free(at, &mut cost)) {
                 // The later, the less certain.
                 return cost + settings.contact_cost / (1.0 + number as f64);
             }
-            tracker.update(route, &state.pose);
+            tracker.update(&on_route.route, &state.pose);
             cost += settings.cross_weight * action_s * tracker.cross_track_m * tracker.cross_track_m;
-            if is_at_end(route, &tracker) {
+            if is_at_end(&on_route.route, &tracker) {
                 break;
             }
         }
-        let gained_s = (tracker.arc_m - begun_m) / workspace.robot.max_speed_mps;
+        let gained_s = (tracker.arc_m - begun_m) / robot.max_speed_mps;
         cost - gained_s
     }
 
@@ -197,11 +202,13 @@ impl MppiPilot<'_> {
     fn is_free(&self, state: &RobotState, cost: &mut f64) -> bool {
         let MppiSettings { room_m, room_weight, .. } = *self.settings;
         let robot = &self.workspace.robot;
-        let room = room_beside_m(self.workspace, &state.pose);
-        let lack = (1.0 - room / room_m).clamp(0.0, 1.0);
+        let beside_m = room_beside_m(self.workspace, &state.pose);
+        let lack = (1.0 - beside_m / room_m).clamp(0.0, 1.0);
         let pace = 0.3 + 0.7 * state.wheel_speed_mps / robot.max_speed_mps;
         *cost += room_weight * lack * lack * pace * MODEL_DT_S;
-        self.workspace.checker.is_free(state.pose)
+        // Where even the coarse room exceeds a cell's diagonal, the exact test is spared.
+        let sure_m = 1.5 * self.workspace.checker.field().frame().resolution_m;
+        beside_m > sure_m + self.corner_m || self.workspace.checker.is_free(state.pose)
     }
 }
 
@@ -214,7 +221,10 @@ fn room_beside_m(workspace: &Workspace, pose: &Pose) -> f64 {
     let footprint = &workspace.robot.footprint;
     let reach_m = (footprint.half_length_m() - footprint.half_width_m()).max(0.0);
     let field = workspace.checker.field();
-    let at = |ahead_m: f64| field.sample(pose.to_world(Vector::new(ahead_m, 0.0)));
+    let unit = pose.heading.unit();
+    let at = |ahead_m: f64| {
+        field.frame().cell_at(pose.position + unit * ahead_m).map_or(0.0, |cell| field.at(cell))
+    };
     at(reach_m).min(at(0.0)).min(at(-reach_m)) - footprint.inscribed_radius_m()
 }
 

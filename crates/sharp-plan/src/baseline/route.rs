@@ -5,9 +5,10 @@
 
 use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, plan_guide};
 use sharp_motion::{Budget, HybridSettings, Path, RrtSettings, Steering, hybrid_astar};
-use sharp_sim::RobotState;
+use sharp_sim::{ActionSettings, RobotState};
 use sharp_space::{CollisionChecker, Footprint, FootprintChecker, Heading, Point, Pose, Seed};
 
+use crate::baseline::track::SpeedRule;
 use crate::baseline::{Readiness, Situation, nominal_time_s};
 use crate::percept::{Tracker, Workspace};
 use crate::planner::Query;
@@ -24,6 +25,10 @@ const STILL_TURN_RAD: f64 = 0.3;
 const SPARES: [(f64, f64); 5] = [(0.10, 1.5), (0.06, 1.5), (0.06, 1.25), (0.03, 1.25), (0.0, 1.0)];
 /// Actions between two plans: what a new path needs to show its worth.
 const PATIENCE_ACTIONS: u32 = 6;
+/// Share of the sway that is kept from one action to the next.
+const SWAY_KEPT: f64 = 0.9;
+/// A larger distance from the route is a manoeuvre, not a pull, metres.
+const SWAY_MAX_M: f64 = 0.15;
 
 /// Plans routes for one robot in one map.
 #[derive(Clone, Debug)]
@@ -34,9 +39,9 @@ pub struct RoutePlanner<'a> {
 
 /// An outline and a turning radius with something to spare.
 #[derive(Clone, Debug)]
-struct Attempt {
-    checker: FootprintChecker,
-    steering: Steering,
+pub(crate) struct Attempt {
+    pub(crate) checker: FootprintChecker,
+    pub(crate) steering: Steering,
 }
 
 impl<'a> RoutePlanner<'a> {
@@ -52,10 +57,13 @@ impl<'a> RoutePlanner<'a> {
     #[must_use]
     pub fn plan(&self, query: &Query) -> Option<GuidePath> {
         let goal_radius_m = 0.5 * self.workspace.robot.goal_tolerance_m;
-        self.attempts
-            .iter()
-            .filter(|attempt| attempt.checker.is_free(query.start))
+        self.attempts(query.start)
             .find_map(|attempt| attempt.ridge(query).or_else(|| attempt.searched(query, goal_radius_m)))
+    }
+
+    /// What a robot at `start` has the room to spare for, the most first.
+    pub(crate) fn attempts(&self, start: Pose) -> impl Iterator<Item = &Attempt> {
+        self.attempts.iter().filter(move |attempt| attempt.checker.is_free(start))
     }
 }
 
@@ -114,7 +122,13 @@ pub(crate) struct OnRoute<'a> {
     planner: &'a RoutePlanner<'a>,
     query: Query,
     pub(crate) route: GuidePath,
+    speed: SpeedRule,
+    /// How freely the robot may drive along the route.
+    pub(crate) ease: Vec<f64>,
     pub(crate) tracker: Tracker,
+    /// Recent distance from the route, added up over time, metre seconds, left positive: what a pull
+    /// to one side costs that the follower alone does not cure.
+    pub(crate) sway_ms: f64,
     /// Where the robot last moved, and the actions since.
     anchor: (Pose, u32),
     /// Actions since the last plan; `None` before the first decision.
@@ -122,9 +136,25 @@ pub(crate) struct OnRoute<'a> {
 }
 
 impl<'a> OnRoute<'a> {
-    pub(crate) fn new(planner: &'a RoutePlanner<'a>, query: Query, route: GuidePath) -> Self {
+    pub(crate) fn new(
+        planner: &'a RoutePlanner<'a>,
+        query: Query,
+        route: GuidePath,
+        speed: SpeedRule,
+    ) -> Self {
         let tracker = Tracker::start(&route, &query.start);
-        Self { planner, query, route, tracker, anchor: (query.start, 0), actions: None }
+        let ease = speed.ease(planner.workspace, &route);
+        Self {
+            planner,
+            query,
+            route,
+            speed,
+            ease,
+            tracker,
+            sway_ms: 0.0,
+            anchor: (query.start, 0),
+            actions: None,
+        }
     }
 
     /// Projects the robot onto its route; a new one is planned from where it is if it has left it.
@@ -135,6 +165,9 @@ impl<'a> OnRoute<'a> {
             return self.planned();
         };
         self.tracker.update(&self.route, &state.pose);
+        let action_s = ActionSettings::default().action_s;
+        self.sway_ms =
+            SWAY_KEPT * self.sway_ms + self.tracker.cross_track_m.clamp(-SWAY_MAX_M, SWAY_MAX_M) * action_s;
         self.watch(state);
         self.actions = Some(actions + 1);
         let is_off = self.tracker.cross_track_m.abs() > OFF_ROUTE_M
@@ -146,9 +179,10 @@ impl<'a> OnRoute<'a> {
         let query = Query { start: state.pose, ..self.query };
         match self.planner.plan(&query) {
             Some(route) => {
+                self.ease = self.speed.ease(self.planner.workspace, &route);
                 self.route = route;
                 self.tracker = Tracker::start(&self.route, &state.pose);
-                (self.anchor, self.actions) = ((state.pose, 0), Some(0));
+                (self.anchor, self.actions, self.sway_ms) = ((state.pose, 0), Some(0), 0.0);
                 self.planned()
             }
             // The old route may yet lead on, and the robot may come to stand better.

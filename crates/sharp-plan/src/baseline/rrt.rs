@@ -1,13 +1,14 @@
 //! RRT with replanning, executed open-loop: the planning baseline of Sec. 5.
 //!
-//! The robot is given the points of the planned path one after the other, each for the time that the
-//! plan allots, wherever it really is: feedback is the waypoint controller's alone. Where the path
-//! ends without the goal being reached, a new one is planned from there.
+//! The robot is given the points of the planned path one after the other, each until it is there or
+//! the time that the plan allots is over, wherever it then is: feedback is the waypoint controller's
+//! alone. Where the path ends without the goal being reached, a new one is planned from there.
 
-use sharp_motion::{Outcome, Path, RrtSettings, Steering, Uniform, rrt};
+use sharp_motion::{Path, RrtSettings, ShortcutSettings, Uniform, rrt, shortcut};
 use sharp_sim::{ActionSettings, RobotState};
-use sharp_space::{CollisionChecker, Heading, Point, Pose, Seed};
+use sharp_space::{CollisionChecker, FootprintChecker, Heading, Point, Pose, Seed};
 
+use crate::baseline::route::{Attempt, RoutePlanner};
 use crate::baseline::{Baseline, Pilot, Readiness, Situation, nominal_time_s};
 use crate::percept::Workspace;
 use crate::planner::Query;
@@ -15,12 +16,16 @@ use crate::policy::PolarWaypoint;
 
 /// Distance of the points that the robot is sent to, metres: the farthest that an action may aim at.
 const SPACING_M: f64 = 0.5;
+/// A point counts as reached within this distance, metres; nearer, a robot turns about to hit it.
+const REACHED_M: f64 = 0.1;
 
 /// The baseline `rrt`: plans anew for each execution.
 #[derive(Clone, Debug)]
 pub struct Rrt<'a> {
     /// Map and robot.
     pub workspace: &'a Workspace,
+    /// The outlines and turning radii to plan with.
+    pub planner: &'a RoutePlanner<'a>,
     /// The problem; the goal's heading is free.
     pub query: Query,
     /// Budget and steps of the planner.
@@ -48,6 +53,13 @@ struct Hop {
     actions: u32,
 }
 
+impl Hop {
+    /// Whether a robot at `position` is sent on to the next point.
+    fn is_over(&self, position: Point) -> bool {
+        self.actions == 0 || (position - self.point).norm() <= REACHED_M
+    }
+}
+
 #[derive(Debug)]
 struct RrtPilot<'a> {
     baseline: &'a Rrt<'a>,
@@ -61,6 +73,10 @@ struct RrtPilot<'a> {
 
 impl Pilot for RrtPilot<'_> {
     fn prepare(&mut self, situation: &Situation) -> Readiness {
+        let position = situation.state.pose.position;
+        while self.hops.get(self.next).is_some_and(|hop| hop.is_over(position)) {
+            self.next += 1;
+        }
         if self.next < self.hops.len() && !situation.bumped {
             return Readiness::Ready;
         }
@@ -71,27 +87,23 @@ impl Pilot for RrtPilot<'_> {
         let hop = &mut self.hops[self.next];
         let waypoint = PolarWaypoint::of(&state.pose, hop.point, self.baseline.workspace.robot.max_speed_mps);
         hop.actions -= 1;
-        if hop.actions == 0 {
-            self.next += 1;
-        }
         waypoint
     }
 }
 
 impl RrtPilot<'_> {
     fn plan(&mut self, start: Pose) -> Readiness {
-        let Rrt { workspace, query, settings, .. } = self.baseline;
-        let goal = fitting(workspace, query.goal);
-        let steering = Steering::of(workspace.robot.min_turning_radius_m());
+        let Rrt { workspace, planner, query, settings, .. } = self.baseline;
+        let query = sharp_motion::Query { start, goal: query.goal };
         let mut sampler = Uniform { bounds: workspace.grid.frame().bounds() };
         let mut rng = self.seed.stream("plan", self.plans);
         self.plans += 1;
-        let query = sharp_motion::Query { start, goal };
-        let Outcome::Solved(path) =
-            rrt(&query, &*workspace.checker, &steering, &mut sampler, settings, &mut rng)
-        else {
-            return Readiness::NoWay;
-        };
+        let path = planner.attempts(start).find_map(|Attempt { checker, steering }| {
+            let query = sharp_motion::Query { goal: fitting(checker, query.goal)?, ..query };
+            let path = rrt(&query, checker, steering, &mut sampler, settings, &mut rng).path()?;
+            Some(shortcut(&path, checker, steering, &ShortcutSettings::default(), &mut rng))
+        });
+        let Some(path) = path else { return Readiness::NoWay };
         let nominal_time_s;
         (self.hops, nominal_time_s) = hops(&path, workspace);
         self.next = 0;
@@ -100,10 +112,10 @@ impl RrtPilot<'_> {
 }
 
 /// `goal` with the nearest heading at which the robot fits there.
-fn fitting(workspace: &Workspace, goal: Pose) -> Pose {
+fn fitting(checker: &FootprintChecker, goal: Pose) -> Option<Pose> {
     let turned = |turn: f64| Pose::at(goal.position, Heading::new(goal.heading.radians() + turn));
     let turns = (0..32).flat_map(|i| [f64::from(i) * 0.1, f64::from(i) * -0.1]);
-    turns.map(turned).find(|&pose| workspace.checker.is_free(pose)).unwrap_or(goal)
+    turns.map(turned).find(|&pose| checker.is_free(pose))
 }
 
 /// The points that the robot is sent to, and how long they take at half speed, seconds.
@@ -121,7 +133,7 @@ fn hops(path: &Path, workspace: &Workspace) -> (Vec<Hop>, f64) {
         let step_m = pair[0].distance_m(&pair[1]);
         if step_m < 1e-9 {
             // A corner: no point beyond it before the robot is there.
-            if travel_m > 0.0 {
+            if travel_m > REACHED_M {
                 hop(pair[0].position, &mut travel_m, &mut turn_rad);
             }
             turn_rad += pair[0].heading.turn_to(pair[1].heading).abs();

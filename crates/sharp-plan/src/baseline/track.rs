@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
 use sharp_sim::{RobotModel, RobotState};
-use sharp_space::Heading;
+use sharp_space::{Heading, Pose};
 
 use crate::baseline::route::{OnRoute, RoutePlanner};
 use crate::baseline::{Baseline, Pilot, Readiness, Situation};
@@ -32,38 +32,34 @@ pub struct SpeedRule {
 }
 
 impl SpeedRule {
-    /// The speed for a robot at `state`, metres per second.
-    #[must_use]
-    pub fn speed_mps(
-        &self,
-        workspace: &Workspace,
-        route: &GuidePath,
-        tracker: &Tracker,
-        state: &RobotState,
-    ) -> f64 {
-        let robot = &workspace.robot;
+    /// How freely the robot may drive at each [`LOOK_STEP_M`] of `route`, from 0 (slowest) to 1.
+    pub(crate) fn ease(&self, workspace: &Workspace, route: &GuidePath) -> Vec<f64> {
         let view = GuideView { guide: route, next: None };
-        let half_width_m = robot.footprint.inscribed_radius_m();
-        let steps = (self.ahead_m / LOOK_STEP_M).ceil() as usize;
-        let (mut room_m, mut turn_rad) = (f64::INFINITY, 0.0);
-        let mut heading = tracker.tangent;
-        for i in 0..=steps {
-            let pose = view.ahead(tracker.arc_m + i as f64 * LOOK_STEP_M);
-            room_m = room_m.min(workspace.checker.field().sample(pose.position) - half_width_m);
-            turn_rad += heading.turn_to(pose.heading).abs();
-            heading = pose.heading;
-        }
-        let error_rad = self.error_rad(tracker, state.pose.heading);
+        let half_width_m = workspace.robot.footprint.inscribed_radius_m();
+        let count = (route.length_m() / LOOK_STEP_M) as usize + 1;
+        let ahead = (self.ahead_m / LOOK_STEP_M).ceil() as usize;
+        let poses: Vec<Pose> = (0..=count + ahead).map(|i| view.ahead(i as f64 * LOOK_STEP_M)).collect();
+        let room_m = |pose: &Pose| workspace.checker.field().sample(pose.position) - half_width_m;
         let [tight_m, roomy_m] = self.room_m;
-        let ease = ((room_m - tight_m) / (roomy_m - tight_m))
-            .min(1.0 - turn_rad / self.turn_rad)
-            .min(1.0 - error_rad / self.heading_rad)
-            .clamp(0.0, 1.0);
-        (self.slow + (self.cruise - self.slow) * ease) * robot.max_speed_mps
+        poses
+            .windows(ahead + 1)
+            .map(|ahead| {
+                let least_m = ahead.iter().map(room_m).fold(f64::INFINITY, f64::min);
+                let turn = |pair: &[Pose]| pair[0].heading.turn_to(pair[1].heading).abs();
+                let turn_rad: f64 = ahead.windows(2).map(turn).sum();
+                ((least_m - tight_m) / (roomy_m - tight_m))
+                    .min(1.0 - turn_rad / self.turn_rad)
+                    .clamp(0.0, 1.0)
+            })
+            .collect()
     }
 
-    fn error_rad(&self, tracker: &Tracker, heading: Heading) -> f64 {
-        tracker.tangent.turn_to(heading).abs()
+    /// The speed of a robot that looks along `heading` at a place of its route with the given `ease`,
+    /// as a share of its top speed.
+    fn speed(&self, ease: f64, tangent: Heading, heading: Heading) -> f64 {
+        let error_rad = tangent.turn_to(heading).abs();
+        let ease = ease.min(1.0 - error_rad / self.heading_rad).max(0.0);
+        self.slow + (self.cruise - self.slow) * ease
     }
 }
 
@@ -77,39 +73,39 @@ pub struct TrackSettings {
     pub rule: Rule,
     /// How fast.
     pub speed: SpeedRule,
+    /// Turn of the direction against a sway, radians per metre second.
+    pub sway_gain: f64,
 }
 
 impl TrackSettings {
     /// What did best on generated maps (see `docs/algorithms/baselines.md`).
     #[must_use]
     pub fn new(robot: &RobotModel) -> Self {
-        let speed = SpeedRule {
-            cruise: 0.8,
-            slow: 0.35,
-            room_m: [0.1, 0.4],
-            turn_rad: 1.5,
-            heading_rad: 1.0,
-            ahead_m: 0.75,
-        };
         if robot.can_turn_in_place() {
-            Self { rule: Rule::Field { look_ahead_m: 0.3, softness_m: 0.6 }, speed }
+            let (room_m, turn_rad, heading_rad, ahead_m) = ([0.15, 0.6], 2.0, 0.5, 1.5);
+            let speed = SpeedRule { cruise: 0.8, slow: 0.15, room_m, turn_rad, heading_rad, ahead_m };
+            Self { rule: Rule::Pursuit { look_ahead_m: 0.3 }, speed, sway_gain: 0.0 }
         } else {
-            Self { rule: Rule::Field { look_ahead_m: 0.3, softness_m: 0.6 }, speed }
+            let (room_m, turn_rad, heading_rad, ahead_m) = ([0.1, 0.6], 1.6, 1.0, 0.75);
+            let speed = SpeedRule { cruise: 0.8, slow: 0.3, room_m, turn_rad, heading_rad, ahead_m };
+            Self { rule: Rule::Field { look_ahead_m: 0.4, softness_m: 0.3 }, speed, sway_gain: 0.4 }
         }
     }
 
-    /// The waypoint for a robot in `state` whose projection onto `route` is `tracker`.
-    #[must_use]
-    pub fn waypoint(
+    /// The waypoint for a robot at `pose` whose projection onto its route is `tracker`.
+    pub(crate) fn waypoint(
         &self,
-        workspace: &Workspace,
-        route: &GuidePath,
+        robot: &RobotModel,
+        pose: &Pose,
         tracker: &Tracker,
-        state: &RobotState,
+        on: &OnRoute<'_>,
     ) -> PolarWaypoint {
-        let speed_mps = self.speed.speed_mps(workspace, route, tracker, state);
-        let view = GuideView { guide: route, next: None };
-        Follower { rule: self.rule, speed_mps }.waypoint(&workspace.robot, &state.pose, tracker, &view)
+        let place = (tracker.arc_m / LOOK_STEP_M) as usize;
+        let ease = on.ease[place.min(on.ease.len() - 1)];
+        let speed_mps = self.speed.speed(ease, tracker.tangent, pose.heading) * robot.max_speed_mps;
+        let view = GuideView { guide: &on.route, next: None };
+        let wanted = Follower { rule: self.rule, speed_mps }.waypoint(robot, pose, tracker, &view);
+        PolarWaypoint { bearing_rad: wanted.bearing_rad - self.sway_gain * on.sway_ms, ..wanted }
     }
 }
 
@@ -130,7 +126,7 @@ pub struct Track<'a> {
 
 impl Baseline for Track<'_> {
     fn pilot(&self, _episode: u64) -> Box<dyn Pilot + '_> {
-        let on_route = OnRoute::new(self.planner, self.query, self.route.clone());
+        let on_route = OnRoute::new(self.planner, self.query, self.route.clone(), self.settings.speed);
         Box::new(TrackPilot { baseline: self, on_route })
     }
 }
@@ -147,7 +143,7 @@ impl Pilot for TrackPilot<'_> {
     }
 
     fn decide(&mut self, state: &RobotState) -> PolarWaypoint {
-        let OnRoute { route, tracker, .. } = &self.on_route;
-        self.baseline.settings.waypoint(self.baseline.workspace, route, tracker, state)
+        let robot = &self.baseline.workspace.robot;
+        self.baseline.settings.waypoint(robot, &state.pose, &self.on_route.tracker, &self.on_route)
     }
 }
