@@ -19,9 +19,10 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     if benches.is_empty() {
         bail!("no bench in {}", package.unwrap_or("any crate"));
     }
-    for (package, bench) in benches {
-        // The release profile: the bench profile would compile all dependencies once more.
-        let call = ["bench", "--profile", "release", "--package", package, "--bench", bench, "--"];
+    for (_, bench) in benches {
+        // The bench profile, or one package alone with its own choice of features, would compile
+        // burn once more.
+        let call = ["bench", "--profile", "release", "--workspace", "--bench", bench, "--"];
         let code = exit_code(cargo(&call).args(rest))?;
         if code != 0 {
             return Ok(code);
