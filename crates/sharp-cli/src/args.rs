@@ -345,6 +345,18 @@ pub(crate) struct Eval {
     /// none, nominal, harsh, biased or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
+    /// Only these maps of the suite: names, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    pub(crate) envs: Vec<String>,
+    /// Only these robots of the suite: names, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    pub(crate) robots: Vec<String>,
+    /// Only this kind of option.
+    #[arg(long, value_enum)]
+    pub(crate) options: Option<Kind>,
+    /// Only these problems of each map: numbers from 1, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
+    pub(crate) problems: Vec<usize>,
 }
 
 /// Suites of problems.
