@@ -9,6 +9,7 @@ mod bench;
 mod ci;
 mod eval;
 mod peers;
+mod peers_regions;
 mod process;
 mod stats;
 mod tidy;
@@ -29,7 +30,8 @@ usage: cargo xtask COMMAND
   eval [--profile smoke|quick|paper] [ARGS]
                          sharp eval of that suite
   bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
-  bench peers [sim]      the same work here and in other programs, as JSON lines
+  bench peers [sim|regions]
+                         the same work here and in other programs, as JSON lines
                          [--rounds N] [--seconds S] [--map M]";
 
 fn main() -> ExitCode {

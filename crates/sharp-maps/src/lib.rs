@@ -15,6 +15,7 @@
 //! assert_eq!(map.problems.len(), 5);
 //! ```
 
+mod doors;
 mod error;
 mod files;
 mod floor_plan;
@@ -28,6 +29,7 @@ mod save;
 #[cfg(test)]
 mod drivable;
 
+pub use doors::{Door, load_doors};
 pub use error::MapError;
 pub use load::{LoadOptions, MapFile, Problem, load};
 pub use named::named_maps;
