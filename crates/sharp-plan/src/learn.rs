@@ -11,7 +11,7 @@ use sharp_space::{Pose, Seed};
 
 use crate::certify::{Certificate, Trial};
 use crate::leg::Leg;
-use crate::percept::{Tracker, Workspace};
+use crate::percept::{Expectation, Tracker, Workspace};
 use crate::policy::{Correction, Follower, Form, OptionPolicy};
 use crate::rollout::Driver;
 use crate::starts::Starts;
@@ -266,7 +266,8 @@ impl Lesson<'_> {
         // A car corrects less: at full lock noise on a good base costs more than it teaches.
         let (share, bearing_rad) = if robot.can_turn_in_place() { (0.6, 0.8) } else { (0.4, 0.5) };
         let correction = Correction { speed_mps: share * robot.max_speed_mps, bearing_rad };
-        self.learn_sac(Form::Guide { base, correction }, RewardMode::Shaped(ShapedReward::default()), stop)
+        let expectation = Expectation::new(self.noise, 0.5);
+        self.learn_sac(Form::Guide { base, correction, expectation }, RewardMode::Shaped(ShapedReward::default()), stop)
     }
 
     fn learn_paper(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
