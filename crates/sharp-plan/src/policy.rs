@@ -425,7 +425,11 @@ mod tests {
         let guide = straight(EAST.0, EAST.1);
         let view = GuideView { guide: &guide, next: None };
         let base = Follower::cautious(&husky());
-        let form = Form::Guide { base, correction: Correction { speed_mps: 0.6, bearing_rad: 0.8 }, expectation: Expectation::default() };
+        let form = Form::Guide {
+            base,
+            correction: Correction { speed_mps: 0.6, bearing_rad: 0.8 },
+            expectation: Expectation::default(),
+        };
         let (pose, tracker) = at(Pose::new(0.5, 0.2, 0.1), &guide);
         let wanted = base.waypoint(&husky(), &pose, &tracker, &view);
         assert_eq!(form.waypoint(&husky(), &pose, &tracker, &view, &[0.0, 0.0]), wanted, "no correction");

@@ -122,7 +122,9 @@ fn selected(mut cases: Vec<Case>, args: &Eval) -> Result<Vec<Case>, Failure> {
             return Err(Failure::new("USAGE", format!("{flag}: the suite has no {name:?}")));
         }
     }
-    if let Some(number) = args.problems.iter().find(|&&number| cases.iter().all(|case| case.problem != number)) {
+    if let Some(number) =
+        args.problems.iter().find(|&&number| cases.iter().all(|case| case.problem != number))
+    {
         return Err(Failure::new("USAGE", format!("--problems: the suite has no problem {number}")));
     }
     cases.retain(|case| {

@@ -128,9 +128,8 @@ fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> 
     let checkpoint = args.out.with_extension("state");
     let trained = if checkpoint.exists() {
         let bytes = std::fs::read(&checkpoint).map_err(anyhow::Error::from)?;
-        let state = TrainState::from_bytes(&bytes).map_err(|error| {
-            Failure::new("FILE_INVALID", format!("{}: {error}", checkpoint.display()))
-        })?;
+        let state = TrainState::from_bytes(&bytes)
+            .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", checkpoint.display())))?;
         resume(&mut tasks, state, &settings, &mut observer)
     } else if let Some(from) = &args.from {
         let bytes = std::fs::read(from).map_err(anyhow::Error::from)?;

@@ -94,7 +94,7 @@ pub fn form(robot: &RobotModel, expectation: Expectation) -> Form {
     let (rule, bearing_rad) = if robot.can_turn_in_place() {
         (Rule::Pursuit { look_ahead_m: 0.5 }, 1.0)
     } else {
-        (Rule::Field { look_ahead_m: 0.4, softness_m: 0.5 }, 0.6)
+        (Rule::Field { look_ahead_m: 0.4, softness_m: 0.5 }, 1.0)
     };
     // The action spans all speeds.
     let base = Follower { rule, speed_mps: 0.5 * top_mps };
