@@ -24,8 +24,9 @@ const OURS: [(&str, &str, &[&str]); 3] = [
 ];
 /// How the peer holds the walls: all in one concave mesh, or each as a body.
 const LAYOUTS: [&str; 2] = ["mesh", "bodies"];
-/// What both sides report, each a rate per second.
-const QUANTITIES: [&str; 3] = ["steps", "actions", "idle"];
+/// What both sides report, each a rate per second: steps and waypoints on the way, steps at rest and
+/// against a wall.
+const QUANTITIES: [&str; 4] = ["steps", "actions", "idle", "push"];
 
 /// Compares with the peers of the suite that the first argument names; `--rounds N` and `--seconds S`
 /// set how often and how long each side works, `--map M` picks one map.
