@@ -164,8 +164,9 @@ pub(crate) struct Run {
     /// none, nominal, harsh, biased or a noise file [default: the plan's].
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) noise: Option<String>,
-    /// The simulator.
-    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic")]
+    /// The simulator: walls to push and graze, walls that stop, or wheels and gravity in three
+    /// dimensions, which a build with `--features rigid3d` has.
+    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic|rapier3d")]
     pub(crate) simulator: String,
     /// Whether a robot that strayed, stands still or is late gets a new plan.
     #[arg(long, value_enum, default_value_t = Switch::On)]
@@ -363,8 +364,9 @@ pub(crate) struct Baseline {
     /// none, nominal, harsh, biased or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
-    /// The simulator.
-    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic")]
+    /// The simulator: walls to push and graze, walls that stop, or wheels and gravity in three
+    /// dimensions, which a build with `--features rigid3d` has.
+    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic|rapier3d")]
     pub(crate) simulator: String,
     /// What touching a wall means: the end of the episode, or a bump after which it goes on.
     #[arg(long, value_enum, default_value_t = Collisions::End)]
