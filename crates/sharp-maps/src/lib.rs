@@ -28,6 +28,8 @@ mod save;
 
 #[cfg(test)]
 mod drivable;
+#[cfg(test)]
+mod statistics;
 
 pub use doors::{Door, load_doors};
 pub use error::MapError;
