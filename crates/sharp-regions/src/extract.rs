@@ -32,7 +32,7 @@ pub struct ExtractSettings {
 impl Default for ExtractSettings {
     fn default() -> Self {
         Self {
-            threshold: 0.4,
+            threshold: 0.5,
             doorway_threshold: 0.15,
             area_min_m2: 0.15,
             extent_max_m: 2.5,
