@@ -126,7 +126,8 @@ pub(crate) fn rbvd_settings(workspace: &Workspace) -> RbvdSettings {
     RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m)
 }
 
-fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
+/// The region-based Voronoi diagram of `regions`.
+pub(crate) fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
     let mut settings = rbvd_settings(workspace);
     if metric == Metric::Paper {
         settings.metric = CellMetric::Euclidean;

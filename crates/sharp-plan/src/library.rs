@@ -14,17 +14,19 @@ use sharp_rl::Actor;
 
 use crate::files::{self, FileError};
 use crate::learn::Learnt;
-use crate::policy::{Follower, Form, OptionPolicy};
+use crate::policy::{Follower, Form, OptionPolicy, PacedFollower};
 use crate::stats::Tally;
 
 /// Raised whenever the files change their meaning.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// A policy as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum PolicyFile {
     /// A follower needs nothing but its settings.
     Follower(Follower),
+    /// Nor does a paced one.
+    Paced(PacedFollower),
     /// A learnt policy and the file of its weights.
     Learnt {
         /// What it sees and does.
@@ -38,6 +40,7 @@ impl PolicyFile {
     pub(crate) fn save(policy: &OptionPolicy, folder: &Path) -> Result<Self, FileError> {
         Ok(match policy {
             OptionPolicy::Follower(follower) => Self::Follower(*follower),
+            OptionPolicy::Paced(paced) => Self::Paced(*paced),
             OptionPolicy::Learnt { form, actor } => {
                 let bytes = actor.to_bytes(&BTreeMap::new());
                 Self::Learnt { form: *form, weights: files::write_blob(folder, &bytes, "safetensors")? }
@@ -48,6 +51,7 @@ impl PolicyFile {
     pub(crate) fn load(&self, folder: &Path) -> Result<OptionPolicy, FileError> {
         Ok(match self {
             Self::Follower(follower) => OptionPolicy::Follower(*follower),
+            Self::Paced(paced) => OptionPolicy::Paced(*paced),
             Self::Learnt { form, weights } => {
                 let bytes = files::read_blob(folder, weights)?;
                 let path = folder.join(weights);

@@ -119,7 +119,10 @@ mod tests {
         let base = Follower::cautious(&workspace.robot);
         let correction = Correction { speed_mps: 0.5, bearing_rad: 0.8 };
         [
-            (Form::Guide { base, correction }, RewardMode::Shaped(ShapedReward::default())),
+            (
+                Form::Guide { base, correction, expectation: Expectation::default() },
+                RewardMode::Shaped(ShapedReward::default()),
+            ),
             (Form::Absolute { reach_m: 0.5 }, RewardMode::Paper(PseudoReward::default())),
         ]
     }
