@@ -113,6 +113,7 @@ mod tests {
 
     use super::*;
     use crate::drawn::{HALL, along, legs, world};
+    use crate::percept::Expectation;
     use crate::policy::{Correction, Follower};
 
     fn forms(workspace: &Workspace) -> [(Form, RewardMode); 2] {
