@@ -263,6 +263,12 @@ pub(crate) struct RegionsScore {
     /// Held-out maps of each kind.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) maps: u32,
+    /// Goals on each held-out map, instead of training's number.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) goals: Option<u32>,
+    /// Starts for each goal, instead of training's number.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) starts: Option<u32>,
     /// What is scored at the doors: net, geometric, random, grid or a file.
     #[arg(long, default_value = "net", value_name = "net|geometric|random|grid|FILE")]
     pub(crate) regions: String,

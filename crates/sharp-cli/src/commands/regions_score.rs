@@ -6,9 +6,10 @@ use serde::Serialize;
 use sharp_maps::load_doors;
 use sharp_plan::Workspace;
 use sharp_regions::{
-    ComputeDevice, DoorScore, ExtractSettings, HELD_OUT_KINDS, LabelRobot, Labels, RegionPredictor,
-    RegionScore, RegionSettings, TrainSettings, VALIDATION_KINDS, find_regions, geometric_regions,
-    grid_regions, predict_regions, random_regions, score_doors, score_regions, scoring_maps,
+    ComputeDevice, DoorScore, ExtractSettings, HELD_OUT_KINDS, LabelRobot, LabelSettings, Labels,
+    RegionPredictor, RegionScore, RegionSettings, TrainSettings, VALIDATION_KINDS, find_regions,
+    geometric_regions, grid_regions, predict_regions, random_regions, score_doors, score_regions,
+    scoring_maps,
 };
 use sharp_sim::RobotModel;
 use sharp_space::floorplan::FloorplanKind;
@@ -86,16 +87,20 @@ fn model(file: &Path) -> Result<RegionPredictor, Failure> {
         .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", file.display())))
 }
 
-/// `of_each` labelled maps of each of `kinds`.
+/// As many labelled maps of each of `kinds` as `args` ask for.
 fn labelled(
     kinds: &[FloorplanKind],
-    of_each: u32,
+    args: &RegionsScore,
     robot: &LabelRobot,
     seed: u64,
 ) -> Vec<(OccupancyGrid, Labels)> {
-    let kinds: Vec<_> = kinds.iter().copied().cycle().take(kinds.len() * of_each as usize).collect();
+    let kinds: Vec<_> = kinds.iter().copied().cycle().take(kinds.len() * args.maps as usize).collect();
+    let defaults = TrainSettings::default().labels;
+    let or = |asked: Option<u32>, default: usize| asked.map_or(default, |number| number as usize);
+    let (goals, starts) = (or(args.goals, defaults.goals), or(args.starts, defaults.starts));
+    let labels = LabelSettings { goals, starts, ..defaults };
     let spinner = progress::spinner("solving problems on maps of other kinds than training's");
-    let maps = scoring_maps(&kinds, robot, TrainSettings::default().labels, Seed(seed));
+    let maps = scoring_maps(&kinds, robot, labels, Seed(seed));
     spinner.finish_and_clear();
     maps
 }
@@ -107,7 +112,7 @@ fn score(
     seed: u64,
     json: bool,
 ) -> Result<Exit, Failure> {
-    let maps = labelled(&HELD_OUT_KINDS, args.maps, &label_robot(robot), seed);
+    let maps = labelled(&HELD_OUT_KINDS, args, &label_robot(robot), seed);
     let settings = RegionSettings::default();
     let reach_m = robot.footprint.inscribed_radius_m();
     let mut scores: [Vec<RegionScore>; 4] = Default::default();
@@ -154,7 +159,7 @@ fn calibrate(
     seed: u64,
     json: bool,
 ) -> Result<Exit, Failure> {
-    let maps = labelled(&VALIDATION_KINDS, args.maps, &label_robot(robot), seed);
+    let maps = labelled(&VALIDATION_KINDS, args, &label_robot(robot), seed);
     let seen: Vec<_> = maps
         .iter()
         .map(|(grid, labels)| {
