@@ -36,7 +36,8 @@ fn routes(c: &mut Criterion) {
         for robot in [RobotModel::husky(), RobotModel::limo()] {
             let name = format!("route/{}/{side_m}m", robot.name);
             let stream = &mut Seed(1).stream("rooms", 0);
-            let workspace = Workspace::new(generate(FloorplanKind::FurnishedRooms, side_m, 0.1, stream), robot);
+            let workspace =
+                Workspace::new(generate(FloorplanKind::FurnishedRooms, side_m, 0.1, stream), robot);
             let planner = RoutePlanner::new(&workspace);
             let queries: Vec<Query> = (0..QUERIES).map(|_| query(&workspace, side_m, stream)).collect();
             let solved = queries.iter().filter(|query| planner.plan(query).is_some()).count();
