@@ -12,6 +12,7 @@ mod peers;
 mod process;
 mod stats;
 mod tidy;
+mod train_prior;
 mod train_regions;
 mod tree;
 
@@ -26,6 +27,7 @@ usage: cargo xtask COMMAND
   tidy                   house rules that no compiler checks
   stats                  a table of lines, functions and docs of each crate
   train-regions [ARGS]   sharp regions train ARGS, on the ndarray device by default
+  train-prior [ARGS]     sharp prior train ARGS, for both robots by default
   eval [--profile smoke|quick|paper] [ARGS]
                          sharp eval of that suite
   bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
@@ -45,6 +47,7 @@ fn main() -> ExitCode {
             print!("{}", stats::table(&tree));
             0
         }),
+        "train-prior" => train_prior::run(rest),
         "train-regions" => train_regions::run(rest),
         "eval" => eval::run(rest),
         "bench" if rest.first().is_some_and(|word| word == "peers") => peers::run(&rest[1..]),

@@ -152,11 +152,12 @@ pub(crate) fn library(
     Ok(OptionLibrary::open(&root, &library_key(workspace, noise, learning))?)
 }
 
-/// Options learnt in one world say nothing about another: the key names map, robot, noise, mode and format.
+/// Options learnt in one world say nothing about another: the key names robot, noise, mode and format,
+/// and then the map.
 fn library_key(workspace: &Workspace, noise: &NoiseModel, learning: Learning) -> String {
-    let world =
-        format!("{} {:?} {noise:?} {learning:?} {FORMAT}", map_hash(&workspace.grid), workspace.robot);
-    format!("{}-{}", workspace.robot.name, &hash(world.as_bytes())[..16])
+    let world = format!("{:?} {noise:?} {learning:?} {FORMAT}", workspace.robot);
+    let world = &hash(world.as_bytes())[..8];
+    format!("{}-{world}-{}", workspace.robot.name, &map_hash(&workspace.grid)[..16])
 }
 
 fn cache_folder() -> PathBuf {

@@ -243,7 +243,9 @@ impl Run<'_> {
                 break;
             }
         }
-        match best.filter(|solution| solution.predicted.successes > 0) {
+        // A plan that never holds is none, unless whatever was learnt is to be kept.
+        let keeps_all = self.settings.usable_success == 0.0;
+        match best.filter(|solution| keeps_all || solution.predicted.successes > 0) {
             Some(solution) => Ok(Outcome::Solved(Box::new(solution))),
             None => Ok(Outcome::NoPlan(self.describe_no_plan())),
         }
@@ -282,6 +284,9 @@ impl Run<'_> {
 
     /// Lines 11 to 19: learns what neither the library nor an earlier attempt has. Returns false if stopped.
     fn learn_missing(&mut self, legs: &[Arc<Leg>]) -> Result<bool, FileError> {
+        for leg in legs {
+            self.adopt(leg)?;
+        }
         let missing: Vec<&Arc<Leg>> = legs.iter().filter(|leg| !self.learnt.contains_key(&leg.id)).collect();
         self.monitor.phase(Phase::Learn(missing.len()));
         let results: Vec<_> = missing
@@ -322,9 +327,23 @@ impl Run<'_> {
         }
     }
 
+    /// Takes the policy of `leg` from another map of the library where its corridor is the same.
+    fn adopt(&mut self, leg: &Leg) -> Result<(), FileError> {
+        if self.learnt.contains_key(&leg.id) || leg.id.role() != Role::Option {
+            return Ok(());
+        }
+        if let Some(stored) = self.library.adopt(&leg.corridor(&self.workspace.grid)) {
+            self.before.push(leg.id);
+            self.keep(leg, stored.learnt)?;
+        }
+        Ok(())
+    }
+
     fn keep(&mut self, leg: &Leg, learnt: Learnt) -> Result<(), FileError> {
         if let (LegId::Option(id), true) = (leg.id, learnt.verified.successes > 0) {
-            self.library.insert(id, StoredOption { guide: leg.guide.clone(), learnt: learnt.clone() })?;
+            let corridor = leg.corridor(&self.workspace.grid);
+            let stored = StoredOption { guide: leg.guide.clone(), learnt: learnt.clone(), corridor };
+            self.library.insert(id, stored)?;
         }
         self.learnt.insert(leg.id, learnt);
         Ok(())

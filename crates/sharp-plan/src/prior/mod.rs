@@ -120,3 +120,56 @@ pub fn train_settings() -> TrainSettings {
         ..TrainSettings::fast()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+    use sharp_rl::{Environment, EnvironmentSpec, check_environment, evaluate};
+    use sharp_space::Seed;
+
+    use super::*;
+    use crate::drawn::{HALL, along, world};
+
+    #[test]
+    fn every_shipped_prior_is_sound_and_drives_through_a_hall() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Interface);
+        let course = courses(&workspace, &abstraction, &[along()], Seed(1)).remove(0);
+        let noise = NoiseModel::nominal();
+        let policies = Prior::shipped(&workspace.robot).candidates(&workspace.robot, &noise);
+        assert_eq!(policies.len(), CAUTIONS.len());
+        for (policy, caution) in policies.iter().zip(CAUTIONS) {
+            for certificate in course.certify(policy, &noise, 100, Seed(2)) {
+                assert!(certificate.tally.rate() > 0.9, "caution {caution}: {certificate:?}");
+            }
+        }
+        let limo = RobotModel::limo();
+        assert_eq!(Prior::shipped(&limo).candidates(&limo, &noise).len(), CAUTIONS.len());
+        let again = Prior::from_bytes(&Prior::shipped(&limo).to_bytes()).expect("own bytes");
+        assert_eq!(&again, Prior::shipped(&limo), "written and read");
+    }
+
+    #[test]
+    fn networks_of_another_shape_are_no_prior() {
+        let spec = EnvironmentSpec { observation_len: 3, action_len: 2 };
+        let mut rng = Seed(1).stream("networks", 0);
+        let bytes = SacState::new(spec, &SacSettings::fast(), &mut rng).to_bytes();
+        let error = Prior::from_bytes(&bytes).expect_err("three numbers are not enough").to_string();
+        assert!(error.contains("observation_len: 3"), "{error}");
+        assert!(Prior::from_bytes(b"nothing").is_err(), "not even networks");
+    }
+
+    #[test]
+    fn a_course_runs_on_over_its_hand_overs() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Interface);
+        let courses = std::sync::Arc::new(courses(&workspace, &abstraction, &[along()], Seed(1)));
+        let noises = std::sync::Arc::new(vec![NoiseModel::none()]);
+        let mut task = CourseTask::new(courses, noises, Seed(1));
+        let checked = check_environment(&mut task, &mut Seed(1).stream("check", 0));
+        assert_eq!(checked, Ok(()));
+        let mut rng = Seed(1).stream("networks", 0);
+        let actor = SacState::new(task.spec(), &train_settings().sac, &mut rng).actor;
+        let all = evaluate(std::slice::from_mut(&mut task), &actor, 20, &mut rng).expect("a sound task");
+        assert_eq!(all.successes, 20, "without noise the base follower runs through: {all:?}");
+        assert!(all.mean_steps > 12.0, "more than a leg at a time: {all:?}");
+    }
+}
