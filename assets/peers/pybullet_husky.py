@@ -5,7 +5,8 @@ usage: pybullet_husky.py WALLS.json mesh|bodies SECONDS RESULT.json
 WALLS.json is a list of boxes [centre x, centre y, half length, half width] in metres, as
 crates/sharp-sim/examples/peer_sim.rs prints them; waypoints, controller and time step are the same
 as there. `bodies` makes each box a body of its own, `mesh` makes all of them one concave mesh.
-Writes one JSON object with steps and waypoints per second; PyBullet itself prints to stdout.
+Writes one JSON object with steps per second at rest, on the way and against a wall, and waypoints
+per second; PyBullet itself prints to stdout.
 """
 
 import importlib.metadata
@@ -22,6 +23,10 @@ REACHED_M = 0.1
 HOP_M = 2.0
 WAYPOINTS = [(0, -2), (2, -2), (2, 0), (2, 2), (0, 2), (-2, 2), (-2, 0), (-2, -2)]
 HALF_HEIGHT_M = 0.5
+
+# In front of the slab that the maps have for pushing.
+PUSH_FROM = (2.7, 0.0)
+PUSH_STEPS = 120
 
 # Of the Husky in pybullet_data.
 TRACK_M = 0.5708
@@ -109,6 +114,19 @@ def repeat(seconds, step):
     return count, time.perf_counter() - begun
 
 
+def measure_push(husky, plane, seconds):
+    """Steps a second while the robot pushes a wall."""
+    p.resetBasePositionAndOrientation(husky.body, [*PUSH_FROM, 0.13], [0, 0, 0, 1])
+    p.resetBaseVelocity(husky.body, [0, 0, 0], [0, 0, 0])
+    husky.drive(1.0, 0.0)
+    for _ in range(PUSH_STEPS):
+        p.stepSimulation()
+    touched = {contact[2] for contact in p.getContactPoints(bodyA=husky.body)} - {plane}
+    assert touched, "the robot touches no wall at %s" % (husky.pose(),)
+    steps, push_s = repeat(seconds, p.stepSimulation)
+    return steps / push_s
+
+
 def main():
     path, layout, seconds, result_path = sys.argv[1:]
     with open(path) as file:
@@ -117,7 +135,7 @@ def main():
     p.setAdditionalSearchPath(pybullet_data.getDataPath())
     p.setGravity(0, 0, -9.81)
     p.setTimeStep(DT_S)
-    p.loadURDF("plane.urdf")
+    plane = p.loadURDF("plane.urdf")
     {"mesh": add_mesh, "bodies": add_bodies}[layout](walls)
     husky = Husky(-2.0, -2.0)
     husky.drive(0.0, 0.0)
@@ -130,6 +148,7 @@ def main():
         "idle": idle_steps / idle_s,
         "steps": steps / drive_s,
         "actions": hops / drive_s,
+        "push": measure_push(husky, plane, float(seconds) / 4),
     }
     with open(result_path, "w") as file:
         json.dump(result, file)

@@ -155,7 +155,9 @@ fn learnt_policies_decide_the_same_from_a_plan_and_from_a_library() {
         let from_plan = decisions(&world, &planned.leg.guide, &plan.solution.legs[index].learnt.policy);
         assert_eq!(from_plan, expected, "{} from the plan", planned.leg.id);
         let LegId::Option(id) = planned.leg.id else { continue };
-        let stored = StoredOption { guide: planned.leg.guide.clone(), learnt: planned.learnt.clone() };
+        let corridor = planned.leg.corridor(&plan.workspace.grid);
+        let stored =
+            StoredOption { guide: planned.leg.guide.clone(), learnt: planned.learnt.clone(), corridor };
         library.insert(id, stored).expect("a folder that can be written");
         let opened = OptionLibrary::open(root.path(), "rooms").expect("a sound library");
         let stored = opened.get(id).expect("just inserted");

@@ -1,6 +1,7 @@
 //! One binary of integration tests: it links once.
 mod determinism;
 mod learning;
+mod library;
 mod maps;
 mod paper;
 mod worlds;

@@ -13,6 +13,7 @@ mod peers;
 mod process;
 mod stats;
 mod tidy;
+mod train_prior;
 mod train_regions;
 mod tree;
 
@@ -27,6 +28,7 @@ usage: cargo xtask COMMAND
   tidy                   house rules that no compiler checks
   stats                  a table of lines, functions and docs of each crate
   train-regions [ARGS]   sharp regions train ARGS, on the ndarray device by default
+  train-prior [ARGS]     sharp prior train ARGS, for both robots by default
   eval [--profile smoke|quick|paper] [ARGS]
                          sharp eval of that suite
   baselines [--noise N,..] [--methods M,..] [--envs E,..] [--episodes N] [--out DIR]
@@ -48,6 +50,7 @@ fn main() -> ExitCode {
             print!("{}", stats::table(&tree));
             0
         }),
+        "train-prior" => train_prior::run(rest),
         "train-regions" => train_regions::run(rest),
         "eval" => eval::run(rest),
         "baselines" => baselines::run(rest),

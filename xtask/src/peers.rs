@@ -24,8 +24,9 @@ const OURS: [(&str, &str, &[&str]); 3] = [
 ];
 /// How the peer holds the walls: all in one concave mesh, or each as a body.
 const LAYOUTS: [&str; 2] = ["mesh", "bodies"];
-/// What both sides report, each a rate per second.
-const QUANTITIES: [&str; 3] = ["steps", "actions", "idle"];
+/// What both sides report, each a rate per second: steps and waypoints on the way, steps at rest and
+/// against a wall.
+const QUANTITIES: [&str; 4] = ["steps", "actions", "idle", "push"];
 
 /// Compares with the peers of the suite that the first argument names; `--rounds N` and `--seconds S`
 /// set how often and how long each side works, `--map M` picks one map.
@@ -57,6 +58,7 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
 
 /// Both sides, ready to run.
 struct Sides {
+    example: PathBuf,
     python: PathBuf,
     /// How long each measurement takes, as both sides read it.
     seconds: String,
@@ -64,21 +66,20 @@ struct Sides {
 
 impl Sides {
     fn prepare(seconds: String) -> anyhow::Result<Self> {
-        succeed(cargo(&["build", "--release"]).args(EXAMPLE))?;
-        Ok(Self { python: python()?, seconds })
+        Ok(Self { example: example()?, python: python()?, seconds })
     }
 
     /// Measures every simulator and layout on `map`, by turns.
     fn compare(&self, map: &str, rounds: usize) -> anyhow::Result<Vec<Value>> {
         let walls = folder().join("walls.json");
-        fs::write(&walls, example(&[map, "walls"])?)
+        fs::write(&walls, self.ours(&[map, "walls"])?)
             .with_context(|| format!("cannot write {}", walls.display()))?;
         let mut ours = vec![Vec::new(); OURS.len()];
         let mut peers = vec![Vec::new(); LAYOUTS.len()];
         for round in 1..=rounds {
             eprintln!("{map}: round {round} of {rounds}, load {}", load());
             for ((simulator, ..), results) in OURS.iter().zip(&mut ours) {
-                results.push(parse(&example(&[map, simulator, &self.seconds])?)?);
+                results.push(parse(&self.ours(&[map, simulator, &self.seconds])?)?);
             }
             for (layout, results) in LAYOUTS.iter().zip(&mut peers) {
                 results.push(self.peer(&walls, layout)?);
@@ -96,6 +97,15 @@ impl Sides {
             }
         }
         Ok(lines)
+    }
+
+    /// What our side prints when called with `args`.
+    fn ours(&self, args: &[&str]) -> anyhow::Result<String> {
+        let mut command = Command::new(&self.example);
+        let output = command.args(args).stderr(Stdio::inherit()).output();
+        let output = output.with_context(|| format!("cannot start {}", self.example.display()))?;
+        ensure!(output.status.success(), "peer_sim {} failed: {}", args.join(" "), output.status);
+        String::from_utf8(output.stdout).context("peer_sim prints no text")
     }
 
     /// One measurement of the peer, which says much else on stdout.
@@ -129,15 +139,23 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len().checked_sub(1)? / 2).copied()
 }
 
-const EXAMPLE: [&str; 6] = ["--package", "sharp-sim", "--features", "rigid3d", "--example", "peer_sim"];
+/// Builds our side and returns where it lies: run through cargo it would wait for other builds.
+fn example() -> anyhow::Result<PathBuf> {
+    let mut build = cargo(&["build", "--release", "--package", "sharp-sim", "--features", "rigid3d"]);
+    build.args(["--example", "peer_sim", "--message-format", "json-render-diagnostics"]);
+    let output = build.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    ensure!(output.status.success(), "peer_sim cannot be built");
+    let messages = String::from_utf8_lossy(&output.stdout);
+    executable(&messages).context("cargo does not say where peer_sim lies")
+}
 
-/// What our side prints when called with `args`.
-fn example(args: &[&str]) -> anyhow::Result<String> {
-    let mut command = cargo(&["run", "--quiet", "--release"]);
-    command.args(EXAMPLE).arg("--").args(args).stderr(Stdio::inherit());
-    let output = command.output().context("cannot start cargo")?;
-    ensure!(output.status.success(), "peer_sim {} failed", args.join(" "));
-    String::from_utf8(output.stdout).context("peer_sim prints no text")
+/// The last program that cargo's messages, a JSON object a line, say they built.
+fn executable(messages: &str) -> Option<PathBuf> {
+    let mut programs = messages.lines().rev().filter_map(|line| {
+        let message: Value = serde_json::from_str(line).ok()?;
+        message["executable"].as_str().map(PathBuf::from)
+    });
+    programs.next()
 }
 
 fn parse(text: &str) -> anyhow::Result<Value> {
@@ -199,6 +217,14 @@ mod tests {
         let error = line("sim.idle.mesh", "idle", &[json!({})], &[json!({"idle": 1.0})]);
         let message = error.expect_err("ours is empty").to_string();
         assert_eq!(message, "sim.idle.mesh: a side reports no idle");
+    }
+
+    #[test]
+    fn the_program_is_named_among_cargos_messages() {
+        let messages = "{\"reason\":\"compiler-artifact\",\"executable\":null}\n\
+            {\"executable\":\"/t/examples/peer_sim\"}\n{\"reason\":\"build-finished\"}\n";
+        assert_eq!(executable(messages), Some(PathBuf::from("/t/examples/peer_sim")));
+        assert_eq!(executable("warning"), None, "no message");
     }
 
     #[test]

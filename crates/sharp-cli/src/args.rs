@@ -34,6 +34,9 @@ pub(crate) enum Command {
     /// Train, use and score the predictor of critical regions.
     #[command(subcommand)]
     Regions(Regions),
+    /// Train and score the policy that options begin with.
+    #[command(subcommand)]
+    Prior(PriorCommand),
     /// Look at a map file.
     #[command(subcommand)]
     Map(Map),
@@ -161,8 +164,9 @@ pub(crate) struct Run {
     /// none, nominal, harsh, biased or a noise file [default: the plan's].
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) noise: Option<String>,
-    /// The simulator.
-    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic")]
+    /// The simulator: walls to push and graze, walls that stop, or wheels and gravity in three
+    /// dimensions, which a build with `--features rigid3d` has.
+    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic|rapier3d")]
     pub(crate) simulator: String,
     /// Whether a robot that strayed, stands still or is late gets a new plan.
     #[arg(long, value_enum, default_value_t = Switch::On)]
@@ -235,6 +239,52 @@ pub(crate) struct RegionsScore {
     /// Held-out maps of each kind.
     #[arg(long, default_value_t = 1)]
     pub(crate) maps: u32,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum PriorCommand {
+    /// Train the policy that options begin with, on generated maps.
+    Train(PriorTrain),
+    /// How often it holds on held-out kinds of map, beside the followers.
+    Score(PriorScore),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PriorTrain {
+    /// husky, limo or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    pub(crate) robot: String,
+    /// The file to write, safetensors; a run that was interrupted goes on from FILE.state.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// Number of generated maps.
+    #[arg(long, default_value_t = 90)]
+    pub(crate) maps: u32,
+    /// Environment steps [default: those of the shipped prior].
+    #[arg(long, value_name = "N")]
+    pub(crate) steps: Option<u64>,
+    /// Begin with the networks of this prior instead of fresh ones.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) from: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PriorScore {
+    /// husky, limo or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    pub(crate) robot: String,
+    /// none, nominal, harsh, biased or a noise file (.ron).
+    #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
+    pub(crate) noise: String,
+    /// Number of generated maps.
+    #[arg(long, default_value_t = 12)]
+    pub(crate) maps: u32,
+    /// Episodes of each policy on each leg.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) episodes: u32,
+    /// A prior's file instead of the shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) from: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -314,8 +364,9 @@ pub(crate) struct Baseline {
     /// none, nominal, harsh, biased or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
-    /// The simulator.
-    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic")]
+    /// The simulator: walls to push and graze, walls that stop, or wheels and gravity in three
+    /// dimensions, which a build with `--features rigid3d` has.
+    #[arg(long, default_value = "rapier2d", value_name = "rapier2d|kinematic|rapier3d")]
     pub(crate) simulator: String,
     /// What touching a wall means: the end of the episode, or a bump after which it goes on.
     #[arg(long, value_enum, default_value_t = Collisions::End)]
@@ -345,6 +396,18 @@ pub(crate) struct Eval {
     /// none, nominal, harsh, biased or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
+    /// Only these maps of the suite: names, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    pub(crate) envs: Vec<String>,
+    /// Only these robots of the suite: names, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    pub(crate) robots: Vec<String>,
+    /// Only this kind of option.
+    #[arg(long, value_enum)]
+    pub(crate) options: Option<Kind>,
+    /// Only these problems of each map: numbers from 1, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
+    pub(crate) problems: Vec<usize>,
 }
 
 /// Suites of problems.

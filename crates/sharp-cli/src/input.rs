@@ -1,14 +1,18 @@
 //! Turning what was typed into maps, robots, noises and poses, or into one clear message.
 
 use std::fs;
+use std::io::ErrorKind;
 
 use sharp_maps::{LoadOptions, MapFile, load};
 use sharp_plan::{Query, Workspace};
-use sharp_sim::{NoiseModel, RobotModel};
+use sharp_sim::{NoiseModel, RobotModel, SimulatorKind, UnknownSimulator};
 use sharp_space::{CollisionChecker, Pose};
 
 use crate::args::{MapArgs, Unknown};
 use crate::outcome::Failure;
+
+/// Larger than any description of a robot, a noise or regions.
+const TEXT_MAX_BYTES: u64 = 1 << 20;
 
 /// Reads the map that `args` name.
 pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
@@ -46,16 +50,29 @@ pub(crate) fn noise(name: &str) -> Result<NoiseModel, Failure> {
     NoiseModel::from_ron(&text).map_err(|error| Failure::new("NOISE_INVALID", format!("{name}: {error}")))
 }
 
+/// The simulator called `name`.
+pub(crate) fn simulator(name: &str) -> Result<SimulatorKind, Failure> {
+    name.parse().map_err(|error: UnknownSimulator| Failure::new("USAGE", format!("--simulator: {error}")))
+}
+
 /// The content of a small text file.
 pub(crate) fn read_text(file: &str, what: &str, expected: &str) -> Result<String, Failure> {
-    let metadata = fs::metadata(file).ok().filter(fs::Metadata::is_file);
-    if metadata.is_none_or(|metadata| metadata.len() > 1 << 20) {
-        return Err(Failure::new(
-            "FILE_UNREADABLE",
-            format!("{what} {file:?} is not a file of at most 1 MiB, expected {expected}"),
-        ));
+    let refuse =
+        |why: &str| Failure::new("FILE_UNREADABLE", format!("{what} {file:?} {why}, expected {expected}"));
+    let metadata = fs::metadata(file).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => refuse("is no known name and no file"),
+        _ => refuse(&format!("cannot be read: {error}")),
+    })?;
+    if !metadata.is_file() {
+        return Err(refuse(if metadata.is_dir() { "is a folder" } else { "is no regular file" }));
     }
-    fs::read_to_string(file).map_err(|error| Failure::new("FILE_UNREADABLE", format!("{file}: {error}")))
+    if metadata.len() > TEXT_MAX_BYTES {
+        return Err(refuse("is larger than 1 MiB"));
+    }
+    fs::read_to_string(file).map_err(|error| match error.kind() {
+        ErrorKind::InvalidData => refuse("is not UTF-8 text"),
+        _ => refuse(&format!("cannot be read: {error}")),
+    })
 }
 
 /// A pose typed as `X,Y,YAW`.

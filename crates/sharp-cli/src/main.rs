@@ -49,6 +49,7 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
         Command::Serve(args) => commands::serve::run(args),
         Command::Abstract(args) => commands::abstraction::run(args, cli.json),
         Command::Regions(command) => commands::regions::run(command, cli.seed, cli.json),
+        Command::Prior(command) => commands::prior::run(command, cli.seed, cli.json),
         Command::Map(command) => commands::map::run(command, cli.json),
         Command::Library(command) => commands::library::run(command, cli.json),
         Command::Baseline(args) => commands::baseline::run(args, cli.seed, cli.json),

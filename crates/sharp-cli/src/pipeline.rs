@@ -126,7 +126,8 @@ pub(crate) fn rbvd_settings(workspace: &Workspace) -> RbvdSettings {
     RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m)
 }
 
-fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
+/// The region-based Voronoi diagram of `regions`.
+pub(crate) fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
     let mut settings = rbvd_settings(workspace);
     if metric == Metric::Paper {
         settings.metric = CellMetric::Euclidean;
@@ -151,11 +152,12 @@ pub(crate) fn library(
     Ok(OptionLibrary::open(&root, &library_key(workspace, noise, learning))?)
 }
 
-/// Options learnt in one world say nothing about another: the key names map, robot, noise, mode and format.
+/// Options learnt in one world say nothing about another: the key names robot, noise, mode and format,
+/// and then the map.
 fn library_key(workspace: &Workspace, noise: &NoiseModel, learning: Learning) -> String {
-    let world =
-        format!("{} {:?} {noise:?} {learning:?} {FORMAT}", map_hash(&workspace.grid), workspace.robot);
-    format!("{}-{}", workspace.robot.name, &hash(world.as_bytes())[..16])
+    let world = format!("{:?} {noise:?} {learning:?} {FORMAT}", workspace.robot);
+    let world = &hash(world.as_bytes())[..8];
+    format!("{}-{world}-{}", workspace.robot.name, &map_hash(&workspace.grid)[..16])
 }
 
 fn cache_folder() -> PathBuf {

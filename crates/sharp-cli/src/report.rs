@@ -70,6 +70,7 @@ impl From<&PlannedLeg> for LegReport {
             reused: *reused,
             policy: match learnt.policy {
                 sharp_plan::OptionPolicy::Follower(_) => "follower",
+                sharp_plan::OptionPolicy::Paced(_) => "paced",
                 sharp_plan::OptionPolicy::Learnt { .. } => "learnt",
             },
             env_steps: learnt.env_steps,

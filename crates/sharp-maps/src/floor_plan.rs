@@ -71,11 +71,19 @@ enum Furniture {
 
 /// Reads a floor plan and draws it as a grid whose lower-left corner is the world's origin.
 pub(crate) fn parse(file: &str, text: &str) -> Result<OccupancyGrid, MapError> {
-    let plan: FloorPlan =
-        ron::from_str(text).map_err(|e| MapError::syntax(file, format!("is no floor plan: {e}")))?;
-    let mut canvas = Canvas::new(file, &plan)?;
+    draw(file, &read(file, text)?)
+}
+
+fn read(file: &str, text: &str) -> Result<FloorPlan, MapError> {
+    ron::from_str(text).map_err(|e| MapError::syntax(file, format!("is no floor plan: {e}")))
+}
+
+fn draw(file: &str, plan: &FloorPlan) -> Result<OccupancyGrid, MapError> {
+    let mut canvas = Canvas::new(file, plan)?;
     for (number, wall) in plan.walls.iter().enumerate() {
-        canvas.wall(wall).map_err(|value| MapError::field(file, format!("walls[{number}]"), value, SOUND))?;
+        let field = format!("walls[{number}]");
+        check_doors(file, &field, wall)?;
+        canvas.wall(wall).map_err(|value| MapError::field(file, field, value, SOUND))?;
     }
     for (number, piece) in plan.furniture.iter().enumerate() {
         let field = format!("furniture[{number}]");
@@ -84,7 +92,29 @@ pub(crate) fn parse(file: &str, text: &str) -> Result<OccupancyGrid, MapError> {
     OccupancyGrid::new(canvas.frame, canvas.cells).map_err(|e| MapError::grid(file, e))
 }
 
-const SOUND: &str = "made of finite numbers, with intervals that run upwards and lengths above 0";
+const SOUND: &str =
+    "made of finite numbers, with intervals that run upwards, lengths above 0 and a part inside the map";
+
+/// Refuses doors that are not in their wall, or in each other.
+fn check_doors(file: &str, wall_field: &str, wall: &Wall) -> Result<(), MapError> {
+    let (Wall::Across { x: wall, doors, .. } | Wall::Along { y: wall, doors, .. }) = wall;
+    let span = |door: &Door| (door.at - 0.5 * door.width, door.at + 0.5 * door.width);
+    for (number, door) in doors.iter().enumerate() {
+        let (from, to) = span(door);
+        let refuse = |expected| {
+            let value = format!("{} m wide at {}", door.width, door.at);
+            Err(MapError::field(file, format!("{wall_field}.doors[{number}]"), value, expected))
+        };
+        if !(from < to && from >= wall.0 - EDGE_M && to <= wall.1 + EDGE_M) {
+            return refuse(format!("wider than 0 and within its wall, from {} to {}", wall.0, wall.1));
+        }
+        let meets = |other: &&Door| from < span(other).1 - EDGE_M && span(other).0 < to - EDGE_M;
+        if let Some(other) = doors[..number].iter().find(meets) {
+            return refuse(format!("clear of the door {} m wide at {}", other.width, other.at));
+        }
+    }
+    Ok(())
+}
 
 struct Canvas {
     frame: GridFrame,
@@ -120,8 +150,12 @@ impl Canvas {
             Wall::Across { y, x, doors } => (*y, *x, doors),
             Wall::Along { x, y, doors } => (*x, *y, doors),
         };
-        let sound_doors = doors.iter().all(|door| door.at.is_finite() && door.width > 0.0);
-        if !(line.is_finite() && is_interval(span) && sound_doors) {
+        let (across_m, along_m) = match wall {
+            Wall::Across { .. } => (self.frame.height_m(), self.frame.width_m()),
+            Wall::Along { .. } => (self.frame.width_m(), self.frame.height_m()),
+        };
+        let is_inside = overlaps((line - half, line + half), across_m) && overlaps(span, along_m);
+        if !(line.is_finite() && is_interval(span) && is_inside) {
             return Err(format!("{wall:?}"));
         }
         for stretch in stretches((span.0 - half, span.1 + half), doors) {
@@ -135,14 +169,19 @@ impl Canvas {
 
     /// Draws a piece of furniture, or gives back its text if it is unsound.
     fn furniture(&mut self, piece: &Furniture) -> Result<(), String> {
+        let (x, y) = match *piece {
+            Furniture::Box { x, y } => (x, y),
+            Furniture::Disc { x, y, radius } => ((x - radius, x + radius), (y - radius, y + radius)),
+        };
+        let (width_m, height_m) = (self.frame.width_m(), self.frame.height_m());
+        if !(is_interval(x) && is_interval(y) && overlaps(x, width_m) && overlaps(y, height_m)) {
+            return Err(format!("{piece:?}"));
+        }
         match *piece {
-            Furniture::Box { x, y } if is_interval(x) && is_interval(y) => self.fill(x, y, |_, _| true),
-            Furniture::Disc { x, y, radius } if x.is_finite() && y.is_finite() && radius > 0.0 => {
-                self.fill((x - radius, x + radius), (y - radius, y + radius), |px, py| {
-                    (px - x).hypot(py - y) <= radius
-                });
+            Furniture::Box { .. } => self.fill(x, y, |_, _| true),
+            Furniture::Disc { x: cx, y: cy, radius } => {
+                self.fill(x, y, |px, py| (px - cx).hypot(py - cy) <= radius);
             }
-            _ => return Err(format!("{piece:?}")),
         }
         Ok(())
     }
@@ -167,6 +206,11 @@ fn is_interval((from, to): (f64, f64)) -> bool {
     from.is_finite() && to.is_finite() && from < to
 }
 
+/// Returns true if a part of the interval lies between 0 and `length_m`.
+fn overlaps((from, to): (f64, f64), length_m: f64) -> bool {
+    from < length_m && to > 0.0
+}
+
 /// What the doors leave of a wall.
 fn stretches(wall: (f64, f64), doors: &[Door]) -> Vec<(f64, f64)> {
     let mut gaps: Vec<Door> = doors.to_vec();
@@ -180,6 +224,19 @@ fn stretches(wall: (f64, f64), doors: &[Door]) -> Vec<(f64, f64)> {
     stretches.push((from, wall.1));
     stretches.retain(|(from, to)| from < to);
     stretches
+}
+
+/// The plan without its doors and furniture, and how wide the doors are, metres.
+#[cfg(test)]
+pub(crate) fn shell(text: &str) -> (OccupancyGrid, Vec<f64>) {
+    let mut plan = read("plan", text).expect("a sound plan");
+    let mut widths_m = Vec::new();
+    for wall in &mut plan.walls {
+        let (Wall::Across { doors, .. } | Wall::Along { doors, .. }) = wall;
+        widths_m.extend(doors.drain(..).map(|door| door.width));
+    }
+    plan.furniture.clear();
+    (draw("plan", &plan).expect("a sound plan"), widths_m)
 }
 
 #[cfg(test)]
@@ -225,19 +282,37 @@ mod tests {
         check(
             &plan("Across(y: 0.5, x: (2.0, 0.0))"),
             &expect![
-                "plan: walls[0] is Across { y: 0.5, x: (2.0, 0.0), doors: [] }, must be made of finite numbers, with intervals that run upwards and lengths above 0"
+                "plan: walls[0] is Across { y: 0.5, x: (2.0, 0.0), doors: [] }, must be made of finite numbers, with intervals that run upwards, lengths above 0 and a part inside the map"
             ],
         );
         check(
             &plan("Along(x: inf, y: (0.0, 1.0))"),
             &expect![
-                "plan: walls[0] is Along { x: inf, y: (0.0, 1.0), doors: [] }, must be made of finite numbers, with intervals that run upwards and lengths above 0"
+                "plan: walls[0] is Along { x: inf, y: (0.0, 1.0), doors: [] }, must be made of finite numbers, with intervals that run upwards, lengths above 0 and a part inside the map"
             ],
         );
         check(
             &plan("Along(x: 1.0, z: (0.0, 1.0))"),
             &expect![
                 "plan: is no floor plan: 1:86-1:87: Unexpected field named `z` in `Along`, expected one of `x`, `y`, or `doors` instead"
+            ],
+        );
+        check(
+            &plan("Along(x: 1.0, y: (0.0, 1.0), doors: [(at: 0.5, width: 1.2)])"),
+            &expect![
+                "plan: walls[0].doors[0] is 1.2 m wide at 0.5, must be wider than 0 and within its wall, from 0 to 1"
+            ],
+        );
+        check(
+            &plan("Across(y: 0.5, x: (0.0, 2.0), doors: [(at: 0.5, width: 0.6), (at: 1.0, width: 0.6)])"),
+            &expect![
+                "plan: walls[0].doors[1] is 0.6 m wide at 1, must be clear of the door 0.6 m wide at 0.5"
+            ],
+        );
+        check(
+            &plan("Across(y: 20.0, x: (0.0, 2.0))"),
+            &expect![
+                "plan: walls[0] is Across { y: 20.0, x: (0.0, 2.0), doors: [] }, must be made of finite numbers, with intervals that run upwards, lengths above 0 and a part inside the map"
             ],
         );
         check(

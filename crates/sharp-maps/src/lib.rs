@@ -27,6 +27,8 @@ mod save;
 
 #[cfg(test)]
 mod drivable;
+#[cfg(test)]
+mod statistics;
 
 pub use error::MapError;
 pub use load::{LoadOptions, MapFile, Problem, load};

@@ -32,6 +32,12 @@ pub(crate) fn find(name: &str) -> Option<Result<MapFile, MapError>> {
     Some(read(name, plan, problems))
 }
 
+/// The names and floor plans of all environments, in order.
+#[cfg(test)]
+pub(crate) fn plans() -> impl Iterator<Item = (&'static str, &'static str)> {
+    NAMED.iter().map(|(name, plan, _)| (*name, *plan))
+}
+
 fn read(name: &str, plan: &str, problems: &str) -> Result<MapFile, MapError> {
     let file = format!("{name}.problems.ron");
     let problems: Vec<Problem> = ron::from_str(problems)

@@ -5,18 +5,30 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sharp_guide::{Place, PseudoReward, ShapedReward, StepEvents};
-use sharp_rl::{Progress, StopRule, TrainError, TrainSettings, train};
+use sharp_rl::{
+    Exploration, Progress, SacSettings, SacState, StopRule, TrainError, TrainSettings, fine_tune, train,
+};
 use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, Vehicle};
 use sharp_space::{Pose, Seed};
 
 use crate::certify::{Certificate, Trial};
 use crate::leg::Leg;
-use crate::percept::{Tracker, Workspace};
-use crate::policy::{Correction, Follower, Form, OptionPolicy};
+use crate::percept::{Expectation, Tracker, Workspace};
+use crate::policy::{Follower, Form, OptionPolicy, PacedFollower};
+use crate::prior::{self, Prior};
 use crate::rollout::Driver;
 use crate::starts::Starts;
 use crate::stats::Tally;
 use crate::task::LegTask;
+
+/// What a failure costs, seconds: somebody has to walk there and free the robot.
+const FAILURE_S: f64 = 200.0;
+/// Candidates that are certified where none passes the screening.
+const FINALISTS: usize = 3;
+/// A candidate this much worse than the best in a first look is not looked at again.
+const KEEPS_UP: f64 = 0.1;
+/// Reward of a contact while a prior is trained on: what it was trained with at full caution.
+const FINE_CONTACT: f64 = -20.0;
 
 /// How policies are learnt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,8 +68,18 @@ impl LearnSettings {
                 screening_episodes: 200,
                 certify_episodes: 1000,
                 environments: 16,
+                // Few steps: the prior drives already, and what it has not learnt then it hardly will.
                 train: TrainSettings {
-                    max_env_steps: 16_000,
+                    sac: SacSettings {
+                        learning_rate: 3e-4,
+                        updates_per_step: 0.25,
+                        warmup_steps: 1_000,
+                        exploration: Exploration::Policy,
+                        zero_last_actor_layer: false,
+                        ..prior::train_settings().sac
+                    },
+                    max_env_steps: 12_000,
+                    evaluate_every: 2_000,
                     stop: StopRule::Success { rate: 0.995, episodes: 400 },
                     ..TrainSettings::fast()
                 },
@@ -93,12 +115,17 @@ pub struct Learnt {
 impl Learnt {
     /// The cost that A* uses: seconds per success, and a price for each failure.
     ///
-    /// The paper takes the mean number of steps and knows no failure; a minute is what recovering
-    /// from one costs at least.
+    /// The paper takes the mean number of steps and knows no failure.
     #[must_use]
     pub fn cost_s(&self) -> f64 {
-        let success = self.verified.rate().max(1e-3);
-        self.mean_time_s / success + 60.0 * (1.0 - success)
+        Self::cost_of(self.mean_time_s, self.verified)
+    }
+
+    /// The cost of a leg that takes `mean_time_s` where it succeeds and holds as `verified` says.
+    #[must_use]
+    pub(crate) fn cost_of(mean_time_s: f64, verified: Tally) -> f64 {
+        let success = verified.rate().max(1e-3);
+        mean_time_s / success + FAILURE_S * (1.0 - success)
     }
 }
 
@@ -219,65 +246,87 @@ impl Lesson<'_> {
         self.trial(self.settings.certify_episodes, "certify", 0).of_leg(&self.driver(policy), &self.starts)
     }
 
+    /// The fastest policy at hand that holds as wanted; where none does, the best one, trained on.
     fn learn_fast(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
         let mut screened = self.screen();
         screened.sort_by(|a, b| a.1.mean_time_s.total_cmp(&b.1.mean_time_s));
         let passes = |certificate: &Certificate| certificate.tally.rate() >= self.settings.wanted_success;
-        for (follower, _) in screened.iter().filter(|(_, certificate)| passes(certificate)) {
+        let mut best: Option<(OptionPolicy, Certificate)> = None;
+        for (policy, _) in screened.iter().filter(|(_, certificate)| passes(certificate)) {
             if stop() {
                 return Err(LearnFailure::Stopped);
             }
-            let policy = OptionPolicy::Follower(*follower);
-            let certificate = self.certify(&policy);
+            let certificate = self.certify(policy);
             if passes(&certificate) {
-                return Ok(learnt(policy, certificate, (0, 0)));
+                return Ok(learnt(policy.clone(), certificate, (0, 0)));
             }
+            keep_better(&mut best, policy.clone(), certificate);
         }
-        // None holds: the follower with the best odds becomes the base of a learnt correction.
-        let odds = |entry: &&(Follower, Certificate)| entry.1.tally.successes;
-        let best = screened.iter().max_by_key(odds).map(|entry| entry.0).expect("there are candidates");
-        let learnt_correction = self.learn_correction(best, stop)?;
-        let fallback_policy = OptionPolicy::Follower(best);
-        let fallback = self.certify(&fallback_policy);
-        if fallback.tally.successes >= learnt_correction.verified.successes {
-            let effort = (learnt_correction.env_steps, learnt_correction.gradient_steps);
-            return Ok(learnt(fallback_policy, fallback, effort));
+        // None holds. The best of the screening was lucky or is good: fresh episodes tell.
+        screened.sort_by(|a, b| b.1.tally.successes.cmp(&a.1.tally.successes));
+        for (policy, _) in screened.into_iter().take(FINALISTS) {
+            let certificate = self.certify(&policy);
+            keep_better(&mut best, policy, certificate);
         }
-        Ok(learnt_correction)
+        let (policy, certificate) = best.expect("there are candidates");
+        if self.settings.train.max_env_steps == 0 {
+            return Ok(learnt(policy, certificate, (0, 0)));
+        }
+        let trained = self.train_on(stop)?;
+        let effort = (trained.env_steps, trained.gradient_steps);
+        if certificate.tally.successes >= trained.verified.successes {
+            return Ok(learnt(policy, certificate, effort));
+        }
+        Ok(trained)
     }
 
-    fn screen(&self) -> Vec<(Follower, Certificate)> {
-        let trial = self.trial(self.settings.screening_episodes, "screen", 0);
-        Follower::candidates(&self.workspace.robot)
+    /// Everything that drives without learning, each on a number of episodes that grows while it
+    /// keeps up with the best.
+    fn screen(&self) -> Vec<(OptionPolicy, Certificate)> {
+        let screening = self.settings.screening_episodes;
+        let first = self.trial(screening.div_ceil(4), "first screen", 0);
+        let robot = &self.workspace.robot;
+        let mut candidates: Vec<OptionPolicy> =
+            Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
+        candidates.extend(PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced));
+        candidates.extend(Prior::shipped(robot).candidates(robot, self.noise));
+        let seen: Vec<_> = candidates
             .into_iter()
-            .map(|follower| {
-                let policy = OptionPolicy::Follower(follower);
-                (follower, trial.of_leg(&self.driver(&policy), &self.starts))
+            .map(|policy| {
+                let certificate = first.of_leg(&self.driver(&policy), &self.starts);
+                (policy, certificate)
+            })
+            .collect();
+        let most = seen.iter().map(|(_, certificate)| certificate.tally.rate()).fold(0.0, f64::max);
+        let trial = self.trial(screening, "screen", 0);
+        seen.into_iter()
+            .filter(|(_, certificate)| certificate.tally.rate() >= most - KEEPS_UP)
+            .map(|(policy, _)| {
+                let certificate = trial.of_leg(&self.driver(&policy), &self.starts);
+                (policy, certificate)
             })
             .collect()
     }
 
-    fn learn_correction(
-        &self,
-        base: Follower,
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Learnt, LearnFailure> {
+    /// The prior, trained further on this leg alone.
+    fn train_on(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
         let robot = &self.workspace.robot;
-        // A car corrects less: at full lock noise on a good base costs more than it teaches.
-        let (share, bearing_rad) = if robot.can_turn_in_place() { (0.6, 0.8) } else { (0.4, 0.5) };
-        let correction = Correction { speed_mps: share * robot.max_speed_mps, bearing_rad };
-        self.learn_sac(Form::Guide { base, correction }, RewardMode::Shaped(ShapedReward::default()), stop)
+        let form = prior::form(robot, Expectation::new(self.noise, 1.0));
+        let reward = ShapedReward { contact: FINE_CONTACT, ..ShapedReward::default() };
+        let networks = Prior::shipped(robot).networks();
+        self.learn_sac(form, RewardMode::Shaped(reward), Some(networks), stop)
     }
 
     fn learn_paper(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
         let form = Form::Absolute { reach_m: self.workspace.robot.waypoint_reach_m };
-        self.learn_sac(form, RewardMode::Paper(PseudoReward::default()), stop)
+        self.learn_sac(form, RewardMode::Paper(PseudoReward::default()), None, stop)
     }
 
     fn learn_sac(
         &self,
         form: Form,
         reward: RewardMode,
+        networks: Option<&SacState>,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Learnt, LearnFailure> {
         let task = |index| {
@@ -291,14 +340,29 @@ impl Lesson<'_> {
             if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let mut rng = self.seed.stream("sac", 0);
-        let trained =
-            train(&mut tasks, &self.settings.train, &mut rng, &mut observer).map_err(LearnFailure::Broken)?;
+        let settings = &self.settings.train;
+        let trained = match networks {
+            Some(networks) => fine_tune(&mut tasks, networks, settings, &mut rng, &mut observer),
+            None => train(&mut tasks, settings, &mut rng, &mut observer),
+        };
+        let trained = trained.map_err(LearnFailure::Broken)?;
         if stop() {
             return Err(LearnFailure::Stopped);
         }
         let policy = OptionPolicy::Learnt { form, actor: Box::new(trained.actor) };
         let certificate = self.certify(&policy);
         Ok(learnt(policy, certificate, (trained.env_steps, trained.updates)))
+    }
+}
+
+/// Keeps the policy with more successes; the earlier one of equals.
+fn keep_better(
+    best: &mut Option<(OptionPolicy, Certificate)>,
+    policy: OptionPolicy,
+    certificate: Certificate,
+) {
+    if best.as_ref().is_none_or(|(_, best)| certificate.tally.successes > best.tally.successes) {
+        *best = Some((policy, certificate));
     }
 }
 
@@ -320,7 +384,7 @@ mod tests {
         let with =
             |successes| Learnt { verified: Tally { episodes: 100, successes }, ..followed(&workspace) };
         assert_eq!(with(100).cost_s(), 5.0, "its mean time");
-        assert_eq!(with(50).cost_s(), 40.0, "twice the time and half a minute");
+        assert_eq!(with(50).cost_s(), 110.0, "twice the time and half of what a failure costs");
         assert!(with(0).cost_s() > 1000.0, "dear beyond use");
     }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
 use sharp_options::{AllowedRule, Endpoint, EndpointId, OptionId, OptionSet};
 use sharp_rbvd::{Rbvd, StateId};
-use sharp_space::{Point, Pose};
+use sharp_space::{Cell, OccupancyGrid, Point, Pose};
 
 /// What a leg is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -112,6 +112,9 @@ pub struct Leg {
     pub rbvd: Arc<Rbvd>,
 }
 
+/// Cells this far from a guide can matter to its policy, metres: the reach of its rays and its outline.
+const CORRIDOR_M: f64 = 3.0;
+
 /// The goal of a problem: where, and how near is near enough, metres.
 pub(crate) type Goal = (Point, f64);
 
@@ -151,6 +154,36 @@ impl Leg {
         let state = self.rbvd.state_at(pose.position);
         state.is_none_or(|state| self.allowed.contains(&state))
             || self.source.as_ref().is_some_and(|source| source.contains(pose.position, &self.rbvd))
+    }
+
+    /// The hash of all that a policy of the leg and its certificate depend on: the guide, the sets it
+    /// joins, and the cells around it, by what they are and whether the leg may use them. Equal in
+    /// two maps that differ elsewhere only, whatever their states are called.
+    #[must_use]
+    pub fn corridor(&self, grid: &OccupancyGrid) -> String {
+        let frame = grid.frame();
+        let numbers = |pose: &Pose| [pose.position.x, pose.position.y, pose.heading.radians()];
+        let mut bytes: Vec<u8> =
+            self.guide.poses().iter().flat_map(numbers).flat_map(f64::to_le_bytes).collect();
+        bytes.extend(frame.resolution_m.to_le_bytes());
+        let center = self.target.center();
+        bytes.extend([center.x, center.y].into_iter().flat_map(f64::to_le_bytes));
+        let positions = || self.guide.poses().iter().map(|pose| pose.position);
+        let least = |of: fn(Point) -> f64| positions().map(of).fold(f64::INFINITY, f64::min) - CORRIDOR_M;
+        let most = |of: fn(Point) -> f64| positions().map(of).fold(f64::NEG_INFINITY, f64::max) + CORRIDOR_M;
+        let inside = |point: Point| {
+            (least(|p| p.x)..=most(|p| p.x)).contains(&point.x)
+                && (least(|p| p.y)..=most(|p| p.y)).contains(&point.y)
+        };
+        let cells = (0..frame.height).flat_map(|row| (0..frame.width).map(move |col| Cell::new(col, row)));
+        for cell in cells.filter(|&cell| inside(frame.center(cell))) {
+            let point = frame.center(cell);
+            let is_source = self.source.as_ref().is_some_and(|source| source.contains(point, &self.rbvd));
+            let allowed = self.rbvd.state_of(cell).map_or(2, |state| u8::from(self.allowed.contains(&state)));
+            let target = u8::from(self.target.contains(point, &self.rbvd));
+            bytes.push(grid.get(cell) as u8 | allowed << 2 | u8::from(is_source) << 4 | target << 5);
+        }
+        crate::files::hash(&bytes)
     }
 
     /// Actions after which the leg counts as failed: ten, and three times what half speed needs.

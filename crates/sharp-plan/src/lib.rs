@@ -17,6 +17,7 @@ mod percept;
 mod plan;
 mod planner;
 mod policy;
+pub mod prior;
 mod rollout;
 mod search;
 mod sharp;
@@ -38,10 +39,13 @@ pub use files::{FileError, hash, read_ron, write_atomic, write_ron};
 pub use learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson, RewardMode};
 pub use leg::{Leg, LegId, Role, Target};
 pub use library::{FORMAT, OptionLibrary, StoredOption};
-pub use percept::{Percept, Tracker, Workspace};
+pub use percept::{Expectation, Percept, Tracker, Workspace};
 pub use plan::{AbstractionFile, Plan, map_hash};
 pub use planner::{Abstraction, Planner, Query, SearchSettings, Unplaced};
-pub use policy::{Correction, DecisionScratch, Follower, Form, GuideView, OptionPolicy, PolarWaypoint, Rule};
+pub use policy::{
+    Correction, DecisionScratch, Follower, Form, GuideView, OptionPolicy, PacedFollower, PolarWaypoint, Rule,
+};
+pub use prior::Prior;
 pub use rollout::{ChainRun, Driver, LegEnd, LegOutcome, drive_chain};
 pub use search::{Candidate, OptionGraph};
 pub use sharp::{Monitor, Outcome, Phase, PlannedLeg, Solution, SolveSettings, kind_name, solve};

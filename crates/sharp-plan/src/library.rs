@@ -1,8 +1,10 @@
 //! The option library: learnt options, kept from one problem to the next.
 //!
-//! A library folder holds one folder per key (map, robot, noise, learning mode and format, hashed),
-//! so that a policy is never used in a world it was not learnt in. Each option is one text file that
-//! names its weights by their hash: a reader finds the old option or the new one, never a mix.
+//! A library folder holds one folder per key (`world-map`: robot, noise, learning mode and format
+//! make the world), so that a policy is never used in a world it was not learnt in. Each option is
+//! one text file that names its weights by their hash: a reader finds the old option or the new one,
+//! never a mix. When the map changes, an option whose corridor did not change keeps its policy and
+//! its certificate ([`OptionLibrary::adopt`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,17 +16,19 @@ use sharp_rl::Actor;
 
 use crate::files::{self, FileError};
 use crate::learn::Learnt;
-use crate::policy::{Follower, Form, OptionPolicy};
+use crate::policy::{Follower, Form, OptionPolicy, PacedFollower};
 use crate::stats::Tally;
 
 /// Raised whenever the files change their meaning.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// A policy as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum PolicyFile {
     /// A follower needs nothing but its settings.
     Follower(Follower),
+    /// Nor does a paced one.
+    Paced(PacedFollower),
     /// A learnt policy and the file of its weights.
     Learnt {
         /// What it sees and does.
@@ -38,6 +42,7 @@ impl PolicyFile {
     pub(crate) fn save(policy: &OptionPolicy, folder: &Path) -> Result<Self, FileError> {
         Ok(match policy {
             OptionPolicy::Follower(follower) => Self::Follower(*follower),
+            OptionPolicy::Paced(paced) => Self::Paced(*paced),
             OptionPolicy::Learnt { form, actor } => {
                 let bytes = actor.to_bytes(&BTreeMap::new());
                 Self::Learnt { form: *form, weights: files::write_blob(folder, &bytes, "safetensors")? }
@@ -48,6 +53,7 @@ impl PolicyFile {
     pub(crate) fn load(&self, folder: &Path) -> Result<OptionPolicy, FileError> {
         Ok(match self {
             Self::Follower(follower) => OptionPolicy::Follower(*follower),
+            Self::Paced(paced) => OptionPolicy::Paced(*paced),
             Self::Learnt { form, weights } => {
                 let bytes = files::read_blob(folder, weights)?;
                 let path = folder.join(weights);
@@ -70,6 +76,8 @@ pub struct StoredOption {
     pub guide: GuidePath,
     /// Its policy with its certificate.
     pub learnt: Learnt,
+    /// The hash of all that the two depend on ([`Leg::corridor`](crate::Leg::corridor)).
+    pub corridor: String,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -77,6 +85,7 @@ pub struct StoredOption {
 struct OptionFile {
     format: u32,
     id: OptionId,
+    corridor: String,
     guide: GuidePath,
     policy: PolicyFile,
     verified: Tally,
@@ -90,6 +99,8 @@ struct OptionFile {
 pub struct OptionLibrary {
     folder: Option<PathBuf>,
     options: BTreeMap<OptionId, StoredOption>,
+    /// Files of the same world with other maps, by corridor.
+    elsewhere: BTreeMap<String, PathBuf>,
 }
 
 impl OptionLibrary {
@@ -99,7 +110,8 @@ impl OptionLibrary {
         Self::default()
     }
 
-    /// Opens the part of the library at `root` that belongs to `key`, empty if there is none yet.
+    /// Opens the part of the library at `root` that belongs to `key`, empty if there is none yet. The
+    /// name of the world ends at the last hyphen of `key`, the map's follows.
     ///
     /// # Errors
     /// Returns an error that names the file that is damaged or of another format.
@@ -119,7 +131,16 @@ impl OptionLibrary {
             }
             options.insert(file.id, load_option(file, &folder)?);
         }
-        Ok(Self { folder: Some(folder), options })
+        let elsewhere = files_elsewhere(root, key);
+        Ok(Self { folder: Some(folder), options, elsewhere })
+    }
+
+    /// The option that was learnt in the same world with another map, in a corridor that is the same
+    /// cell by cell. Damaged files of other maps are passed over.
+    #[must_use]
+    pub fn adopt(&self, corridor: &str) -> Option<StoredOption> {
+        let path = self.elsewhere.get(corridor)?;
+        load_option(files::read_ron(path).ok()?, path.parent()?).ok()
     }
 
     /// The folder of its files, if it has one.
@@ -160,6 +181,7 @@ impl OptionLibrary {
             let file = OptionFile {
                 format: FORMAT,
                 id,
+                corridor: option.corridor.clone(),
                 guide: option.guide.clone(),
                 policy: PolicyFile::save(&option.learnt.policy, folder)?,
                 verified: option.learnt.verified,
@@ -203,7 +225,29 @@ fn load_option(file: OptionFile, folder: &Path) -> Result<StoredOption, FileErro
         env_steps: file.env_steps,
         gradient_steps: file.gradient_steps,
     };
-    Ok(StoredOption { guide: file.guide, learnt })
+    Ok(StoredOption { guide: file.guide, learnt, corridor: file.corridor })
+}
+
+/// The option files of the world of `key` with other maps, by corridor.
+fn files_elsewhere(root: &Path, key: &str) -> BTreeMap<String, PathBuf> {
+    let Some((world, _)) = key.rsplit_once('-') else { return BTreeMap::new() };
+    let folders = std::fs::read_dir(root).into_iter().flatten().flatten();
+    let mut folders: Vec<PathBuf> = folders
+        .filter(|entry| {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            name != key && name.rsplit_once('-').is_some_and(|(other, _)| other == world)
+        })
+        .map(|entry| entry.path())
+        .collect();
+    folders.sort();
+    let files = folders.iter().filter_map(|folder| option_files(folder).ok()).flatten();
+    files
+        .filter_map(|path| {
+            let file: OptionFile = files::read_ron(&path).ok()?;
+            (file.format == FORMAT).then_some((file.corridor, path))
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -224,7 +268,7 @@ mod tests {
     fn stored(policy: OptionPolicy) -> StoredOption {
         let verified = Tally { episodes: 1000, successes: 990 };
         let learnt = Learnt { policy, verified, mean_time_s: 4.5, env_steps: 600, gradient_steps: 300 };
-        StoredOption { guide: straight((0.0, 0.0), (2.0, 0.0)), learnt }
+        StoredOption { guide: straight((0.0, 0.0), (2.0, 0.0)), learnt, corridor: "c".repeat(8) }
     }
 
     fn follower() -> OptionPolicy {
@@ -274,6 +318,23 @@ mod tests {
             OptionLibrary::open(root.path(), "elsewhere").unwrap().is_empty(),
             "another key, another world"
         );
+    }
+
+    #[test]
+    fn an_option_is_adopted_where_world_and_corridor_are_the_same() {
+        let root = tempfile::tempdir().unwrap();
+        let mut library = OptionLibrary::open(root.path(), "husky-1-mapa").unwrap();
+        library.insert(TO_ONE, stored(network())).unwrap();
+        let adopts = |key: &str, corridor: &str| {
+            OptionLibrary::open(root.path(), key).unwrap().adopt(corridor).is_some()
+        };
+        assert!(adopts("husky-1-mapb", "cccccccc"), "another map, the same corridor");
+        assert!(!adopts("husky-1-mapb", "cccccccd"), "another corridor");
+        assert!(!adopts("husky-2-mapb", "cccccccc"), "another world");
+        let file = root.path().join("husky-1-mapa/c_0-1.ron");
+        let text = fs::read_to_string(&file).unwrap().replace("episodes:1000", "episodes:1001");
+        fs::write(&file, text.replace("episodes: 1000", "episodes: 1001")).unwrap();
+        assert!(!adopts("husky-1-mapb", "cccccccc"), "a damaged file of another map is passed over");
     }
 
     #[test]

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
-use sharp_sim::{Drive, RobotModel, RobotState, World};
+use sharp_sim::{ActionSettings, Drive, NoiseModel, RobotModel, RobotState, World};
 use sharp_space::{FootprintChecker, Heading, OccupancyGrid, Pose, Vector};
 
 use crate::policy::{GuideView, PolarWaypoint};
@@ -14,8 +15,16 @@ const RAYS: usize = 12;
 const RAY_LENGTH_M: f64 = 2.0;
 /// Where along the guide the policy looks, metres ahead of the robot.
 const LOOK_AHEAD_M: [f64; 4] = [0.4, 0.8, 1.4, 2.2];
+/// Points of the outline that feel the room around them, in units of its half length and half width.
+const OUTLINE: [(f64, f64); 8] =
+    [(1.0, 1.0), (1.0, 0.0), (1.0, -1.0), (0.0, 1.0), (0.0, -1.0), (-1.0, 1.0), (-1.0, 0.0), (-1.0, -1.0)];
+/// Room that is as good as any, metres: beside the outline, and along the guide.
+const ROOM_MAX_M: [f64; 2] = [0.4, 0.8];
+/// Share of what was felt before that is kept from one action to the next.
+const FELT_KEPT: f64 = 0.8;
 /// Length of [`guide_observation`].
-pub(crate) const GUIDE_OBSERVATION_LEN: usize = 7 + 2 * LOOK_AHEAD_M.len() + RAYS + 5;
+pub(crate) const GUIDE_OBSERVATION_LEN: usize =
+    7 + 3 * LOOK_AHEAD_M.len() + RAYS + OUTLINE.len() + 7 + Expectation::LEN;
 /// Length of [`absolute_observation`].
 pub(crate) const ABSOLUTE_OBSERVATION_LEN: usize = 5;
 
@@ -51,6 +60,50 @@ pub struct Percept {
     pub last_displacement: [f64; 3],
     /// The last waypoint asked for, as it was seen then.
     pub last_command: PolarWaypoint,
+    /// What noise did of late: turn beyond the bearing asked for, radians an action, and distance
+    /// driven as a share of what was asked for; means in which older actions count less.
+    pub felt: [f64; 2],
+}
+
+/// What a learnt policy is told before it drives: how careful to be and which noise to expect.
+///
+/// One network then serves every noise and every trade of time against risk. Each entry is from 0
+/// to about 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expectation {
+    /// How much a contact matters, 0 to 1.
+    pub caution: f32,
+    /// Standard deviation of the waypoint, decimetres.
+    pub waypoint: f32,
+    /// Pull to one side, 0.3 rad/s at 1 m/s.
+    pub drift: f32,
+    /// Share of speed and turn that may be lost, halves.
+    pub slip: f32,
+    /// Deviation of the gains, 0.3.
+    pub gain: f32,
+}
+
+impl Expectation {
+    const LEN: usize = 5;
+
+    /// What `noise` lets a policy expect that is told to be as careful as `caution`.
+    #[must_use]
+    pub fn new(noise: &NoiseModel, caution: f32) -> Self {
+        let extra = noise.slippery_patches.map_or(0.0, |patches| patches.share * patches.extra_slip);
+        let entry = |value: f64, unit: f64| (value / unit).min(2.0) as f32;
+        Self {
+            caution,
+            waypoint: entry(noise.waypoint_sd_m, 0.1),
+            drift: entry(noise.drift_sd_radps + noise.drift_bias_radps, 0.3),
+            slip: entry(noise.slip_max + extra, 0.5),
+            gain: entry(noise.gain_sd, 0.3),
+        }
+    }
+
+    const fn entries(&self) -> [f32; Self::LEN] {
+        [self.caution, self.waypoint, self.drift, self.slip, self.gain]
+    }
 }
 
 impl Percept {
@@ -58,7 +111,7 @@ impl Percept {
     #[must_use]
     pub const fn first(state: RobotState) -> Self {
         let last_command = PolarWaypoint { reach_m: 0.0, bearing_rad: 0.0, speed_mps: 0.0 };
-        Self { state, last_displacement: [0.0; 3], last_command }
+        Self { state, last_displacement: [0.0; 3], last_command, felt: [0.0, 1.0] }
     }
 
     /// The percept after `command` moved the robot to `after`.
@@ -67,7 +120,10 @@ impl Percept {
         let before = &self.state.pose;
         let moved = before.to_local(after.pose.position);
         let turn = before.heading.turn_to(after.pose.heading);
-        Self { state: after, last_displacement: [moved.x, moved.y, turn], last_command: command }
+        let asked_m = command.speed_mps.mul_add(ActionSettings::default().action_s, 0.05);
+        let now = [turn - command.bearing_rad.clamp(-1.0, 1.0), moved.norm() / asked_m];
+        let felt = [0, 1].map(|i| FELT_KEPT * self.felt[i] + (1.0 - FELT_KEPT) * now[i]);
+        Self { state: after, last_displacement: [moved.x, moved.y, turn], last_command: command, felt }
     }
 }
 
@@ -106,12 +162,14 @@ impl Tracker {
 /// The observation in the guide's frame; every entry is about one in size.
 ///
 /// remaining arc, cross-track, heading error (sin, cos), speed, yaw rate, steering, four guide
-/// points ahead (x, y in the robot's frame), twelve rays, last displacement (3), last command (2).
+/// points ahead (x, y in the robot's frame, room beside the robot there), twelve rays, room at eight
+/// points of the outline, last displacement (3), last command (2), what noise did of late (2), and
+/// what to expect (5).
 pub(crate) fn guide_observation(
     workspace: &Workspace,
     percept: &Percept,
     tracker: &Tracker,
-    view: &GuideView<'_>,
+    (view, expectation): (&GuideView<'_>, &Expectation),
     observation: &mut [f32],
 ) {
     let robot = &workspace.robot;
@@ -133,14 +191,24 @@ pub(crate) fn guide_observation(
         Drive::Ackermann { max_steer_rad, .. } => percept.state.steer_rad / max_steer_rad,
         Drive::Differential { .. } => 0.0,
     });
+    let field = workspace.checker.field();
+    let [beside_max_m, ahead_max_m] = ROOM_MAX_M;
     for ahead_m in LOOK_AHEAD_M {
-        let local = pose.to_local(view.ahead(tracker.arc_m + ahead_m).position);
+        let ahead = view.ahead(tracker.arc_m + ahead_m).position;
+        let local = pose.to_local(ahead);
         put(local.x.clamp(-3.0, 3.0) / 2.0);
         put(local.y.clamp(-3.0, 3.0) / 2.0);
+        let room_m = field.sample(ahead) - robot.footprint.inscribed_radius_m();
+        put(room_m.clamp(0.0, ahead_max_m) / ahead_max_m);
     }
     for ray in 0..RAYS {
         let angle = pose.heading.radians() + std::f64::consts::TAU * ray as f64 / RAYS as f64;
         put(ray_length_m(workspace, pose, angle) / RAY_LENGTH_M);
+    }
+    let (half_length_m, half_width_m) = (robot.footprint.half_length_m(), robot.footprint.half_width_m());
+    for (ahead, left) in OUTLINE {
+        let point = pose.to_world(Vector::new(ahead * half_length_m, left * half_width_m));
+        put(field.sample(point).clamp(0.0, beside_max_m) / beside_max_m);
     }
     let [dx, dy, turn] = percept.last_displacement;
     put(dx / robot.waypoint_reach_m);
@@ -148,6 +216,9 @@ pub(crate) fn guide_observation(
     put(turn);
     put(percept.last_command.speed_mps / robot.max_speed_mps);
     put(percept.last_command.bearing_rad / std::f64::consts::PI);
+    put(percept.felt[0]);
+    put(percept.felt[1].min(2.0));
+    expectation.entries().into_iter().for_each(|entry| put(f64::from(entry)));
 }
 
 /// Free length from the robot's centre along `angle_rad`, metres, by sphere tracing.
@@ -205,7 +276,8 @@ mod tests {
         let tracker = Tracker::start(&guide, &state.pose);
         let mut observation = [f32::NAN; GUIDE_OBSERVATION_LEN];
         let view = GuideView { guide: &guide, next: None };
-        guide_observation(&workspace, &percept, &tracker, &view, &mut observation);
+        let expectation = Expectation::new(&NoiseModel::harsh(), 1.0);
+        guide_observation(&workspace, &percept, &tracker, (&view, &expectation), &mut observation);
         assert!(observation.iter().all(|entry| entry.abs() <= 1.5), "{observation:?}");
         let mut absolute = [f32::NAN; ABSOLUTE_OBSERVATION_LEN];
         absolute_observation(&percept, &guide, &mut absolute);

@@ -10,7 +10,13 @@ use sharp_rl::{Actor, ActorScratch};
 use sharp_sim::RobotModel;
 use sharp_space::{Heading, Point, Pose, Vector};
 
-use crate::percept::{Percept, Tracker, Workspace, absolute_observation, guide_observation};
+use crate::percept::{Expectation, Percept, Tracker, Workspace, absolute_observation, guide_observation};
+
+/// The slowest that a learnt policy drives, as a share of the top speed: enough to turn on the spot.
+const SLOWEST: f64 = 0.05;
+
+/// Distance between two looks along the guide, metres.
+const PACE_STEP_M: f64 = 0.25;
 
 /// How a follower chooses its direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,6 +46,17 @@ pub struct Follower {
     pub rule: Rule,
     /// How fast, metres per second.
     pub speed_mps: f64,
+}
+
+/// Follows a guide path fast where it may and slowly where it must: where room is scarce, before
+/// bends and while the robot looks elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PacedFollower {
+    /// Where to, and how fast where nothing asks for care.
+    pub follower: Follower,
+    /// How fast where everything does, metres per second.
+    pub slow_mps: f64,
 }
 
 /// A waypoint as the robot sees it.
@@ -117,6 +134,62 @@ impl Follower {
     }
 }
 
+impl PacedFollower {
+    /// The paced followers worth trying for `robot`.
+    #[must_use]
+    pub fn candidates(robot: &RobotModel) -> Vec<Self> {
+        let rules = [
+            Rule::Pursuit { look_ahead_m: 0.5 },
+            Rule::Pursuit { look_ahead_m: 0.3 },
+            Rule::Field { look_ahead_m: 0.4, softness_m: 0.4 },
+        ];
+        let paces = [(1.0, 0.3), (0.8, 0.15)];
+        let top_mps = robot.max_speed_mps;
+        let paced = |rule, (fast, slow): (f64, f64)| Self {
+            follower: Follower { rule, speed_mps: fast * top_mps },
+            slow_mps: slow * top_mps,
+        };
+        paces.into_iter().flat_map(|pace| rules.map(|rule| paced(rule, pace))).collect()
+    }
+
+    /// The next waypoint, as [`Follower::waypoint`].
+    #[must_use]
+    pub fn waypoint(
+        &self,
+        workspace: &Workspace,
+        pose: &Pose,
+        tracker: &Tracker,
+        view: &GuideView<'_>,
+    ) -> PolarWaypoint {
+        let wanted = self.follower.waypoint(&workspace.robot, pose, tracker, view);
+        let ease = ease(workspace, pose, tracker, view);
+        PolarWaypoint { speed_mps: self.slow_mps + (wanted.speed_mps - self.slow_mps) * ease, ..wanted }
+    }
+}
+
+/// How freely a robot at `pose` may drive along its guide: 1 where room, bends and its own heading
+/// allow every speed, 0 where one of them forbids all haste.
+fn ease(workspace: &Workspace, pose: &Pose, tracker: &Tracker, view: &GuideView<'_>) -> f64 {
+    let steering = workspace.robot.can_turn_in_place();
+    let (room_m, turn_max_rad, error_max_rad, ahead_m) =
+        if steering { ([0.15, 0.6], 2.0, 0.5, 1.5) } else { ([0.1, 0.6], 1.6, 1.0, 0.75) };
+    let half_width_m = workspace.robot.footprint.inscribed_radius_m();
+    let field = workspace.checker.field();
+    let (mut least_m, mut turn_rad) = (f64::INFINITY, 0.0);
+    let mut before = tracker.tangent;
+    for step in 0..=(ahead_m / PACE_STEP_M) as usize {
+        let ahead = view.ahead(tracker.arc_m + step as f64 * PACE_STEP_M);
+        least_m = least_m.min(field.sample(ahead.position) - half_width_m);
+        turn_rad += before.turn_to(ahead.heading).abs();
+        before = ahead.heading;
+    }
+    let error_rad = tracker.tangent.turn_to(pose.heading).abs();
+    ((least_m - room_m[0]) / (room_m[1] - room_m[0]))
+        .min(1.0 - turn_rad / turn_max_rad)
+        .min(1.0 - error_rad / error_max_rad)
+        .clamp(0.0, 1.0)
+}
+
 /// A guide path and, where it is known, the one that follows it.
 #[derive(Clone, Copy, Debug)]
 pub struct GuideView<'a> {
@@ -166,6 +239,8 @@ pub enum Form {
         base: Follower,
         /// What a full action changes.
         correction: Correction,
+        /// What the network is told.
+        expectation: Expectation,
     },
     /// The paper's: absolute configuration and vector to the nearest guide point; the action is the
     /// displacement to the next point in the world frame, each component in ±`reach_m`.
@@ -195,7 +270,9 @@ impl Form {
         observation: &mut [f32],
     ) {
         match self {
-            Self::Guide { .. } => guide_observation(workspace, percept, tracker, view, observation),
+            Self::Guide { expectation, .. } => {
+                guide_observation(workspace, percept, tracker, (view, expectation), observation);
+            }
             Self::Absolute { .. } => absolute_observation(percept, view.guide, observation),
         }
     }
@@ -212,11 +289,11 @@ impl Form {
     ) -> PolarWaypoint {
         let (a, b) = (f64::from(action[0]), f64::from(action[1]));
         match self {
-            Self::Guide { base, correction } => {
+            Self::Guide { base, correction, .. } => {
                 let wanted = base.waypoint(robot, pose, tracker, view);
                 let speed_mps = wanted.speed_mps + a * correction.speed_mps;
                 PolarWaypoint {
-                    speed_mps: speed_mps.clamp(0.1 * robot.max_speed_mps, robot.max_speed_mps),
+                    speed_mps: speed_mps.clamp(SLOWEST * robot.max_speed_mps, robot.max_speed_mps),
                     bearing_rad: wanted.bearing_rad + b * correction.bearing_rad,
                     ..wanted
                 }
@@ -235,6 +312,8 @@ impl Form {
 pub enum OptionPolicy {
     /// A certified follower.
     Follower(Follower),
+    /// A certified follower that knows haste and care.
+    Paced(PacedFollower),
     /// A policy learnt by soft actor-critic.
     Learnt {
         /// What it sees and what its action means.
@@ -266,6 +345,7 @@ impl OptionPolicy {
             Self::Follower(follower) => {
                 follower.waypoint(&workspace.robot, &percept.state.pose, tracker, view)
             }
+            Self::Paced(paced) => paced.waypoint(workspace, &percept.state.pose, tracker, view),
             Self::Learnt { form, actor } => {
                 scratch.observation.resize(form.observation_len(), 0.0);
                 form.observe(workspace, percept, tracker, view, &mut scratch.observation);
@@ -345,11 +425,15 @@ mod tests {
         let guide = straight(EAST.0, EAST.1);
         let view = GuideView { guide: &guide, next: None };
         let base = Follower::cautious(&husky());
-        let form = Form::Guide { base, correction: Correction { speed_mps: 0.6, bearing_rad: 0.8 } };
+        let form = Form::Guide {
+            base,
+            correction: Correction { speed_mps: 0.6, bearing_rad: 0.8 },
+            expectation: Expectation::default(),
+        };
         let (pose, tracker) = at(Pose::new(0.5, 0.2, 0.1), &guide);
         let wanted = base.waypoint(&husky(), &pose, &tracker, &view);
         assert_eq!(form.waypoint(&husky(), &pose, &tracker, &view, &[0.0, 0.0]), wanted, "no correction");
-        for (action, speed_mps, turn) in [([1.0, 1.0], 1.0, 0.8), ([-1.0, -1.0], 0.1, -0.8)] {
+        for (action, speed_mps, turn) in [([1.0, 1.0], 1.0, 0.8), ([-1.0, -1.0], 0.05, -0.8)] {
             let corrected = form.waypoint(&husky(), &pose, &tracker, &view, &action);
             assert_eq!(corrected.speed_mps, speed_mps, "the robot's limits bound {action:?}");
             assert!((corrected.bearing_rad - wanted.bearing_rad - turn).abs() < 1e-9, "{action:?}");

@@ -21,8 +21,12 @@ use crate::stats::Tally;
 
 /// Start states kept of each leg.
 const START_POOL: usize = 256;
-/// Plans tried before the problem counts as unsolvable.
+/// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
+/// Gain below which a repaired policy counts as no better, share of episodes: luck explains less.
+const GAIN_MIN: f64 = 0.003;
+/// Plans run from end to end before the best of them is taken.
+const VERIFIED_MAX: usize = 3;
 
 /// All settings of [`solve`].
 #[derive(Clone, Debug)]
@@ -41,7 +45,7 @@ pub struct SolveSettings {
     pub wanted_success: f64,
     /// Fresh runs through the whole plan that its predicted success is counted on.
     pub verify_episodes: u32,
-    /// A leg that holds less often than this in the plan loses its edge.
+    /// A leg that holds less often than this makes the search look for a better way.
     pub usable_success: f64,
     /// The root of all randomness.
     pub seed: Seed,
@@ -165,8 +169,17 @@ pub fn solve(
         Err(unplaced) => return Ok(Outcome::NoPlan(describe_unplaced(unplaced).to_owned())),
     };
     let before = library.iter().map(|(id, _)| LegId::Option(id)).collect();
-    let mut run =
-        Run { workspace, query, settings, library, monitor, planner, before, learnt: BTreeMap::new() };
+    let mut run = Run {
+        workspace,
+        query,
+        settings,
+        library,
+        monitor,
+        planner,
+        before,
+        learnt: BTreeMap::new(),
+        observed: BTreeMap::new(),
+    };
     let outcome = run.solve();
     monitor.phase(Phase::Done);
     outcome
@@ -190,49 +203,90 @@ struct Run<'a> {
     before: Vec<LegId>,
     /// Everything with a policy in this problem: from the library, or learnt now.
     learnt: BTreeMap<LegId, Learnt>,
+    /// What legs held in a plan where they fell short.
+    observed: BTreeMap<LegId, Tally>,
 }
 
 impl Run<'_> {
     fn solve(&mut self) -> Result<Outcome, FileError> {
         self.learnt
             .extend(self.library.iter().map(|(id, stored)| (LegId::Option(id), stored.learnt.clone())));
+        let mut best: Option<Solution> = None;
+        let mut verified = 0;
         for _ in 0..ATTEMPTS_MAX {
-            let learnt = &self.learnt;
-            let Some(legs) = self.planner.plan(&|id| learnt.get(&id).map(Learnt::cost_s), self.monitor)
-            else {
-                return Ok(Outcome::NoPlan(self.describe_no_plan()));
-            };
+            let Some(legs) = self.search() else { break };
             if self.monitor.should_stop() || !self.learn_missing(&legs)? {
                 return Ok(Outcome::Stopped);
             }
-            if self.ban_useless(&legs, |run, leg| run.learnt[&leg.id].verified) {
+            // A leg that falls short has become dear: there may be a better way by now.
+            let falls_short = |leg: &Arc<Leg>| self.falls_short(self.learnt[&leg.id].verified);
+            if legs.iter().any(falls_short) && self.search().is_none_or(|again| ids(&again) != ids(&legs)) {
                 continue;
             }
-            self.monitor.phase(Phase::Verify);
-            for round in 0..self.settings.repair_rounds {
-                if self.monitor.should_stop() {
-                    return Ok(Outcome::Stopped);
-                }
-                if !self.repair(&legs, u64::from(round))? {
-                    break;
+            let Some(solution) = self.verify(&legs)? else { return Ok(Outcome::Stopped) };
+            verified += 1;
+            let mut falls_short = false;
+            for planned in &solution.legs {
+                if self.falls_short(planned.on_arrival) {
+                    falls_short = true;
+                    self.observed.insert(planned.leg.id, planned.on_arrival);
                 }
             }
-            let runs = self.run_chain(&legs, self.settings.verify_episodes, "verify", 0);
-            let on_arrival = tallies(&runs, legs.len());
-            let weak = |_: &Self, leg: &Leg| {
-                let index = legs.iter().position(|other| other.id == leg.id).expect("a leg of this plan");
-                on_arrival[index]
-            };
-            if self.ban_useless(&legs, weak) {
-                continue;
+            let is_better = |best: &Solution| solution.predicted.successes > best.predicted.successes;
+            if best.as_ref().is_none_or(is_better) {
+                best = Some(solution);
             }
-            return Ok(Outcome::Solved(Box::new(self.solution(&legs, &runs, &on_arrival))));
+            if !falls_short
+                || verified == VERIFIED_MAX
+                || self.search().is_none_or(|again| ids(&again) == ids(&legs))
+            {
+                break;
+            }
         }
-        Ok(Outcome::NoPlan(format!("{ATTEMPTS_MAX} plans were tried and none held")))
+        // A plan that never holds is none, unless whatever was learnt is to be kept.
+        let keeps_all = self.settings.usable_success == 0.0;
+        match best.filter(|solution| keeps_all || solution.predicted.successes > 0) {
+            Some(solution) => Ok(Outcome::Solved(Box::new(solution))),
+            None => Ok(Outcome::NoPlan(self.describe_no_plan())),
+        }
+    }
+
+    /// The cheapest plan by all that is known by now.
+    fn search(&mut self) -> Option<Vec<Arc<Leg>>> {
+        let Self { planner, learnt, observed, monitor, .. } = self;
+        let cost = |id: LegId| {
+            let known = learnt.get(&id)?;
+            let verified = observed.get(&id).copied().unwrap_or(known.verified);
+            Some(Learnt::cost_of(known.mean_time_s, verified))
+        };
+        planner.plan(&cost, *monitor)
+    }
+
+    fn falls_short(&self, tally: Tally) -> bool {
+        tally.episodes > 0 && tally.rate() < self.settings.usable_success
+    }
+
+    /// Repairs the plan of `legs` and counts how often it holds; `None` if stopped.
+    fn verify(&mut self, legs: &[Arc<Leg>]) -> Result<Option<Solution>, FileError> {
+        self.monitor.phase(Phase::Verify);
+        for round in 0..self.settings.repair_rounds {
+            if self.monitor.should_stop() {
+                return Ok(None);
+            }
+            if !self.repair(legs, u64::from(round))? {
+                break;
+            }
+        }
+        let runs = self.run_chain(legs, self.settings.verify_episodes, "verify", 0);
+        let on_arrival = tallies(&runs, legs.len());
+        Ok(Some(self.solution(legs, &runs, &on_arrival)))
     }
 
     /// Lines 11 to 19: learns what neither the library nor an earlier attempt has. Returns false if stopped.
     fn learn_missing(&mut self, legs: &[Arc<Leg>]) -> Result<bool, FileError> {
+        for leg in legs {
+            self.adopt(leg)?;
+        }
         let missing: Vec<&Arc<Leg>> = legs.iter().filter(|leg| !self.learnt.contains_key(&leg.id)).collect();
         self.monitor.phase(Phase::Learn(missing.len()));
         let results: Vec<_> = missing
@@ -273,25 +327,26 @@ impl Run<'_> {
         }
     }
 
-    fn keep(&mut self, leg: &Leg, learnt: Learnt) -> Result<(), FileError> {
-        if let (LegId::Option(id), true) = (leg.id, learnt.verified.successes > 0) {
-            self.library.insert(id, StoredOption { guide: leg.guide.clone(), learnt: learnt.clone() })?;
+    /// Takes the policy of `leg` from another map of the library where its corridor is the same.
+    fn adopt(&mut self, leg: &Leg) -> Result<(), FileError> {
+        if self.learnt.contains_key(&leg.id) || leg.id.role() != Role::Option {
+            return Ok(());
         }
-        self.learnt.insert(leg.id, learnt);
+        if let Some(stored) = self.library.adopt(&leg.corridor(&self.workspace.grid)) {
+            self.before.push(leg.id);
+            self.keep(leg, stored.learnt)?;
+        }
         Ok(())
     }
 
-    /// Takes the legs that hold too rarely out of the search. Returns true if there was one.
-    fn ban_useless(&mut self, legs: &[Arc<Leg>], tally: impl Fn(&Self, &Leg) -> Tally) -> bool {
-        let is_useless = |leg: &&Arc<Leg>| {
-            let tally = tally(self, leg);
-            tally.episodes > 0 && tally.rate() < self.settings.usable_success
-        };
-        let useless: Vec<LegId> = legs.iter().filter(is_useless).map(|leg| leg.id).collect();
-        for &id in &useless {
-            self.planner.ban(id);
+    fn keep(&mut self, leg: &Leg, learnt: Learnt) -> Result<(), FileError> {
+        if let (LegId::Option(id), true) = (leg.id, learnt.verified.successes > 0) {
+            let corridor = leg.corridor(&self.workspace.grid);
+            let stored = StoredOption { guide: leg.guide.clone(), learnt: learnt.clone(), corridor };
+            self.library.insert(id, stored)?;
         }
-        !useless.is_empty()
+        self.learnt.insert(leg.id, learnt);
+        Ok(())
     }
 
     fn drivers<'b>(&'b self, legs: &'b [Arc<Leg>]) -> Vec<Driver<'b>> {
@@ -350,7 +405,11 @@ impl Run<'_> {
             runs.iter().filter_map(|run| run.entries.get(index).copied()).collect();
         let seed = self.settings.seed.child(&format!("repair {}", leg.id), round);
         let starts = self.starts(leg, seed).with_arrivals(arrivals);
-        let settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
+        let mut settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
+        if self.learnt[&leg.id].gradient_steps > 0 {
+            // It was trained in vain or for nearly the same.
+            settings.train.max_env_steps = 0;
+        }
         let next = legs.get(index + 1);
         let lesson = Lesson { settings: &settings, next, ..self.lesson(leg, starts, seed) };
         let old = &self.learnt[&leg.id];
@@ -358,7 +417,8 @@ impl Run<'_> {
         let mut new = lesson.learn(&|| self.monitor.should_stop()).ok()?;
         new.env_steps += old.env_steps;
         new.gradient_steps += old.gradient_steps;
-        (new.verified.successes > present.tally.successes).then_some(new)
+        let gained = new.verified.rate() - present.tally.rate();
+        (gained >= GAIN_MIN).then_some(new)
     }
 
     fn solution(&self, legs: &[Arc<Leg>], runs: &[ChainRun], on_arrival: &[Tally]) -> Solution {
@@ -391,6 +451,11 @@ impl Run<'_> {
             None => "no sequence of options leads from the start to the goal".to_owned(),
         }
     }
+}
+
+/// The names of `legs`.
+fn ids(legs: &[Arc<Leg>]) -> Vec<LegId> {
+    legs.iter().map(|leg| leg.id).collect()
 }
 
 /// Stands for a policy that never succeeds.

@@ -113,13 +113,17 @@ mod tests {
 
     use super::*;
     use crate::drawn::{HALL, along, legs, world};
+    use crate::percept::Expectation;
     use crate::policy::{Correction, Follower};
 
     fn forms(workspace: &Workspace) -> [(Form, RewardMode); 2] {
         let base = Follower::cautious(&workspace.robot);
         let correction = Correction { speed_mps: 0.5, bearing_rad: 0.8 };
         [
-            (Form::Guide { base, correction }, RewardMode::Shaped(ShapedReward::default())),
+            (
+                Form::Guide { base, correction, expectation: Expectation::default() },
+                RewardMode::Shaped(ShapedReward::default()),
+            ),
             (Form::Absolute { reach_m: 0.5 }, RewardMode::Paper(PseudoReward::default())),
         ]
     }

@@ -58,6 +58,22 @@ fn steps_of_robots(c: &mut Criterion) {
     }
 }
 
+/// What does a step cost that pushes a wall, where the engine has to work?
+fn pushes(c: &mut Criterion) {
+    for map in ["boxes_100", "boxes_10000", "grid_75"] {
+        let grid = grid(map);
+        for kind in KINDS {
+            let mut sim = simulator(kind, &grid, &RobotModel::husky());
+            let command = Command::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
+            // The slab is 3.3 m ahead.
+            let contacts = (0..300).filter(|_| sim.step(command, DT_S).in_contact).count();
+            assert!(contacts > 50, "{kind} on {map} touches in {contacts} steps: {:?}", sim.state());
+            let name = format!("push/{kind}/husky/{map}");
+            c.bench_function(&name, |b| b.iter(|| black_box(sim.step(command, DT_S))));
+        }
+    }
+}
+
 /// Times steps on a circle of a metre, checked once to be clear.
 fn circle(c: &mut Criterion, name: &str, sim: &mut AnySim) {
     let command = Command::Twist { speed_mps: 0.8, yaw_rate_radps: 1.0 };
@@ -164,5 +180,5 @@ fn two_metres_ahead(from: &Pose) -> Pose {
     Pose::at(from.position + from.heading.unit() * 2.0, from.heading)
 }
 
-criterion_group!(benches, steps_on_maps, steps_of_robots, actions, forks, collision_checks);
+criterion_group!(benches, steps_on_maps, steps_of_robots, pushes, actions, forks, collision_checks);
 criterion_main!(benches);

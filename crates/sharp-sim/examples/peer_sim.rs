@@ -1,6 +1,7 @@
 //! Our side of `cargo xtask bench peers sim`: the Husky around a square, timed.
 //!
-//! `peer_sim MAP SIMULATOR SECONDS` prints one JSON object with steps and waypoints per second;
+//! `peer_sim MAP SIMULATOR SECONDS` prints one JSON object with steps per second at rest, on the
+//! way and against a wall, and waypoints per second;
 //! `peer_sim MAP walls` prints the walls, for the other side to build. The other side is
 //! `assets/peers/pybullet_husky.py`: same waypoints, controller and time step.
 
@@ -24,6 +25,10 @@ const HOP_M: f64 = 2.0;
 /// A square around the origin; every other hop turns by 90 degrees.
 const WAYPOINTS: [(f64, f64); 8] =
     [(0.0, -2.0), (2.0, -2.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0), (-2.0, 2.0), (-2.0, 0.0), (-2.0, -2.0)];
+/// A fifth of a metre in front of the slab that the maps have for pushing.
+const PUSH_FROM: (f64, f64) = (2.7, 0.0);
+/// Half a second: enough to meet it.
+const PUSH_STEPS: usize = 120;
 /// Steps between two looks at the clock.
 const BURST: usize = 64;
 
@@ -69,12 +74,26 @@ fn measure(grid: &OccupancyGrid, kind: SimulatorKind, time: Duration) -> String 
     });
     let (steps, drive_s) = repeat(time, || circuit.step());
     let hops = circuit.hops as f64 + (1.0 - circuit.left_m / HOP_M).clamp(0.0, 1.0);
+    let push = measure_push(&mut circuit.sim, time / 4);
     format!(
-        "{{\"name\":\"{kind}\",\"idle\":{},\"steps\":{},\"actions\":{}}}",
+        "{{\"name\":\"{kind}\",\"idle\":{},\"steps\":{},\"actions\":{},\"push\":{push}}}",
         idle_steps as f64 / idle_s,
         steps as f64 / drive_s,
         hops / drive_s,
     )
+}
+
+/// Steps a second while the robot pushes a wall.
+fn measure_push(sim: &mut AnySim, time: Duration) -> f64 {
+    sim.reset(RobotState::at_rest(Pose::new(PUSH_FROM.0, PUSH_FROM.1, 0.0)));
+    let command = Command::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
+    for _ in 0..PUSH_STEPS {
+        sim.step(command, DT_S);
+    }
+    let mut touches = 0;
+    let (steps, push_s) = repeat(time, || touches += usize::from(sim.step(command, DT_S).in_contact));
+    assert!(2 * touches > steps, "in {touches} of {steps} steps only it touches the wall: {:?}", sim.state());
+    steps as f64 / push_s
 }
 
 /// Calls `step` for about `time`; returns how often and how long it took in seconds.

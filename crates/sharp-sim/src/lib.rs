@@ -29,6 +29,7 @@
 mod contact;
 mod controller;
 mod convert;
+mod description;
 mod kinematic;
 mod noise;
 mod planar;
@@ -43,6 +44,7 @@ mod wheels;
 mod world;
 
 pub use controller::{Aim, WaypointController};
+pub use description::SyntaxError;
 pub use kinematic::KinematicSim;
 pub use noise::{ActionNoise, EpisodeNoise, NoiseError, NoiseModel, STEER_PER_DRIFT_S, SlipperyPatches};
 pub use planar::PlanarSim;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use sharp_space::{Point, Seed, Vector};
 use thiserror::Error;
 
+use crate::description::{self, SyntaxError};
 use crate::robot::RobotModel;
 use crate::state::Command;
 
@@ -27,7 +28,7 @@ const SLIP_MAX: f64 = 0.95;
 pub enum NoiseError {
     /// The text is not a noise model in RON.
     #[error("noise description: {0}")]
-    Syntax(#[from] ron::error::SpannedError),
+    Syntax(#[from] SyntaxError),
     /// A number is out of range or not a number.
     #[error("noise: {field} is {value}, must be from 0 to {max}")]
     Value {
@@ -116,7 +117,7 @@ impl NoiseModel {
     /// # Errors
     /// Returns an error that names the first unreadable place, or the first field out of range.
     pub fn from_ron(text: &str) -> Result<Self, NoiseError> {
-        let noise: Self = ron::from_str(text)?;
+        let noise: Self = description::parse(text)?;
         noise.validate()?;
         Ok(noise)
     }
@@ -346,7 +347,17 @@ mod tests {
         refuse("slip_max: 0.30", "slip_max: 1.5", "noise: slip_max is 1.5, must be from 0 to 0.95");
         refuse("delay_s: 0.1", "delay_s: NaN", "noise: delay_s is NaN, must be from 0 to 10");
         refuse("share: 0.15", "share: -1", "noise: slippery_patches.share is -1, must be from 0 to 1");
-        refuse("gain_sd", "gain_sf", "noise description: 3:5-3:12: Unexpected field named `gain_sf`");
+        refuse(
+            "gain_sd",
+            "gain_sf",
+            "noise description: line 3 \"gain_sf: 0.20,\": Unexpected field named `gain_sf`",
+        );
+        refuse("share: 0.15, ", "", "noise description: line 8");
+        refuse(
+            "gain_sd: 0.20",
+            "gain_sd: wide",
+            "noise description: line 3 \"gain_sd: wide,\": Expected float",
+        );
     }
 
     fn refuse(from: &str, to: &str, message: &str) {

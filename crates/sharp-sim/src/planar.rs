@@ -2,7 +2,9 @@
 //!
 //! The map is one static shape made of merged rectangles: a clone shares it, so a fork costs the
 //! same on any map. Wheels push by the same law as in [`KinematicSim`](crate::KinematicSim); the
-//! engine does contacts, friction at walls and integration.
+//! engine does contacts and friction at walls. There is an engine only while a wall is near: where
+//! nothing can be touched all that it does is to integrate, and [`Motion::glide`] does the same, bit
+//! for bit, in a tenth of the time.
 
 use std::fmt;
 use std::sync::Arc;
@@ -12,16 +14,16 @@ use rapier2d::dynamics::{
     RigidBodyBuilder, RigidBodyHandle, RigidBodySet, SoftBodySet,
 };
 use rapier2d::geometry::{BroadPhaseBvh, ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase};
-use rapier2d::math::Vector as EngineVector;
+use rapier2d::math::{Pose as EnginePose, Rot2, Vector as EngineVector};
 use rapier2d::pipeline::PhysicsPipeline;
-use sharp_space::{Footprint, Vector};
+use sharp_space::Footprint;
 
 use crate::contact::ContactGuard;
 use crate::convert::{engine_vector, our_vector};
 use crate::robot::RobotModel;
 use crate::simulator::{Simulator, StepInfo};
 use crate::state::{Command, RobotState};
-use crate::wheels::Wheels;
+use crate::wheels::{Push, Wheels};
 use crate::world::World;
 
 /// Friction of the body against walls: a bumper that slides rather than grips.
@@ -29,16 +31,24 @@ const WALL_FRICTION: f32 = 0.3;
 /// One body against fixed walls sinks as deep with two as with the engine's four, and a step costs a
 /// sixth less.
 const SOLVER_ITERATIONS: usize = 2;
+/// A wall further away than this cannot be felt: the engine foresees contacts from 2 cm on, by poses
+/// up to 2 cm old.
+const FELT_WITHIN_M: f64 = 0.05;
+/// The engine limits turns to an eighth of a circle per step; this is well below.
+const TURN_MAX_RAD: f64 = 0.5;
 
 /// A robot that pushes against obstacles and grazes them.
+#[derive(Clone)]
 pub struct PlanarSim {
     world: Arc<World>,
     wheels: Wheels,
     body: Body,
-    engine: Engine,
-    workspace: Workspace,
+    motion: Motion,
+    /// There while a wall is near.
+    engine: Option<Box<Engine>>,
     guard: ContactGuard,
     state: RobotState,
+    felt_within_m: f64,
 }
 
 impl PlanarSim {
@@ -53,34 +63,28 @@ impl PlanarSim {
         let state = RobotState::at_rest(world.frame().origin);
         Self {
             wheels: Wheels::new(robot),
-            engine: Engine::new(&world, &body, &state),
-            workspace: Workspace::default(),
-            guard: ContactGuard::default(),
             body,
+            motion: Motion::new(&world, &state),
+            engine: None,
+            guard: ContactGuard::default(),
             state,
             world,
+            felt_within_m: FELT_WITHIN_M,
         }
+    }
+
+    /// Lets the engine move the robot and returns true if it was pushed back.
+    fn move_among_walls(&mut self, dt_s: f64) -> bool {
+        let engine =
+            self.engine.get_or_insert_with(|| Box::new(Engine::new(&self.world, &self.body, &self.motion)));
+        engine.step(&mut self.motion, dt_s)
     }
 
     fn read_state(&mut self) {
-        let body = &self.engine.bodies[self.engine.robot];
-        self.state.pose = self.world.obstacles().in_world(body.position());
-        self.state.velocity = our_vector(body.rotation().inverse_transform_vector(body.linvel()));
-        self.state.yaw_rate_radps = f64::from(body.angvel());
-    }
-}
-
-impl Clone for PlanarSim {
-    fn clone(&self) -> Self {
-        Self {
-            world: self.world.clone(),
-            wheels: self.wheels,
-            body: self.body,
-            engine: self.engine.clone(),
-            workspace: Workspace::default(),
-            guard: self.guard,
-            state: self.state,
-        }
+        let motion = &self.motion;
+        self.state.pose = self.world.obstacles().in_world(&motion.pose);
+        self.state.velocity = our_vector(motion.pose.rotation.inverse_transform_vector(motion.linvel));
+        self.state.yaw_rate_radps = f64::from(motion.angvel);
     }
 }
 
@@ -93,16 +97,26 @@ impl fmt::Debug for PlanarSim {
 impl Simulator for PlanarSim {
     fn reset(&mut self, state: RobotState) {
         self.state = state;
-        self.engine = Engine::new(&self.world, &self.body, &state);
-        self.workspace = Workspace::default();
+        self.motion = Motion::new(&self.world, &state);
+        self.engine = None;
         self.guard.forget();
     }
 
     fn step(&mut self, command: Command, dt_s: f64) -> StepInfo {
         self.wheels.follow(&mut self.state, command, dt_s);
-        let push = self.wheels.push(&self.state, dt_s);
         let before = self.state.pose;
-        let touched = self.engine.step(&mut self.workspace, push.velocity, push.yaw_rate_radps, dt_s);
+        self.motion.add(&self.wheels.push(&self.state, dt_s));
+        let turn_rad = f64::from(self.motion.angvel.abs()) * dt_s;
+        let way_m = f64::from(self.motion.linvel.length()) * dt_s + turn_rad * self.world.cover_reach_m();
+        let room_m = way_m + self.felt_within_m;
+        if turn_rad < TURN_MAX_RAD && self.guard.has_room(&self.world, &before, room_m) {
+            self.engine = None;
+            self.motion.glide(dt_s);
+            self.read_state();
+            self.guard.spend(way_m);
+            return StepInfo { in_contact: false };
+        }
+        let touched = self.move_among_walls(dt_s);
         self.read_state();
         let after = self.state.pose;
         let turned_rad = before.heading.turn_to(after.heading).abs();
@@ -116,6 +130,41 @@ impl Simulator for PlanarSim {
     }
 }
 
+/// How the body moves, in the engine's frame and precision.
+#[derive(Clone, Copy)]
+struct Motion {
+    pose: EnginePose,
+    linvel: EngineVector,
+    angvel: f32,
+}
+
+impl Motion {
+    fn new(world: &World, state: &RobotState) -> Self {
+        let pose = world.obstacles().to_engine(&state.pose);
+        Self {
+            pose,
+            linvel: pose.rotation.transform_vector(engine_vector(state.velocity)),
+            angvel: state.yaw_rate_radps as f32,
+        }
+    }
+
+    fn add(&mut self, push: &Push) {
+        self.linvel += self.pose.rotation.transform_vector(engine_vector(push.velocity));
+        self.angvel += push.yaw_rate_radps as f32;
+    }
+
+    /// Moves on as the engine does where nothing is touched: the same operations in the same order.
+    fn glide(&mut self, dt_s: f64) {
+        let dt_s = dt_s as f32 / SOLVER_ITERATIONS as f32;
+        for _ in 0..SOLVER_ITERATIONS {
+            let turn = self.angvel * dt_s;
+            let Rot2 { re, im } = self.pose.rotation;
+            self.pose.rotation = Rot2::from_cos_sin_unchecked(re - turn * im, im + turn * re).normalize();
+            self.pose.translation += self.linvel * dt_s;
+        }
+    }
+}
+
 /// What the engine needs to know of the robot.
 #[derive(Clone, Copy)]
 struct Body {
@@ -124,16 +173,10 @@ struct Body {
     yaw_inertia_kgm2: f64,
 }
 
-/// Buffers that the engine reuses; no state of the simulation.
-#[derive(Default)]
-struct Workspace {
-    pipeline: PhysicsPipeline,
-    ccd_solver: CCDSolver,
-}
-
-/// Everything in the engine that changes; cloning it forks the simulation.
+/// The engine with the robot among the walls; cloning it forks the simulation.
 #[derive(Clone)]
 struct Engine {
+    workspace: Workspace,
     parameters: IntegrationParameters,
     islands: IslandManager,
     broad_phase: BroadPhaseBvh,
@@ -148,27 +191,22 @@ struct Engine {
 }
 
 impl Engine {
-    fn new(world: &World, body: &Body, state: &RobotState) -> Self {
+    fn new(world: &World, body: &Body, motion: &Motion) -> Self {
         let mut bodies = RigidBodySet::new();
         let mut colliders = ColliderSet::new();
         // Without a parent: a fixed body each would cost time at every step.
         colliders.insert(ColliderBuilder::new(world.obstacles().shape()).friction(WALL_FRICTION));
-        let pose = world.obstacles().to_engine(&state.pose);
         let inertia = body.yaw_inertia_kgm2 as f32;
         let mass = MassProperties::new(EngineVector::ZERO, body.mass_kg as f32, inertia);
         let robot = bodies.insert(
-            RigidBodyBuilder::dynamic()
-                .pose(pose)
-                .linvel(pose.rotation.transform_vector(engine_vector(state.velocity)))
-                .angvel(state.yaw_rate_radps as f32)
-                .additional_mass_properties(mass)
-                .can_sleep(false),
+            RigidBodyBuilder::dynamic().pose(motion.pose).additional_mass_properties(mass).can_sleep(false),
         );
         let (half_length, half_width) = (body.footprint.half_length_m(), body.footprint.half_width_m());
         let shape = ColliderBuilder::cuboid(half_length as f32, half_width as f32);
         let robot_shape =
             colliders.insert_with_parent(shape.density(0.0).friction(WALL_FRICTION), robot, &mut bodies);
         Self {
+            workspace: Workspace::default(),
             parameters: IntegrationParameters {
                 num_solver_iterations: SOLVER_ITERATIONS,
                 ..IntegrationParameters::default()
@@ -186,14 +224,13 @@ impl Engine {
         }
     }
 
-    /// Pushes the body, moves everything on and returns true if the body was pushed back.
-    fn step(&mut self, workspace: &mut Workspace, velocity: Vector, yaw: f64, dt_s: f64) -> bool {
+    /// Moves everything on by `dt_s`, the robot from `motion`; returns true if it was pushed back.
+    fn step(&mut self, motion: &mut Motion, dt_s: f64) -> bool {
         let body = &mut self.bodies[self.robot];
-        let change = body.rotation().transform_vector(engine_vector(velocity));
-        body.set_linvel(body.linvel() + change, true);
-        body.set_angvel(body.angvel() + yaw as f32, true);
+        body.set_linvel(motion.linvel, true);
+        body.set_angvel(motion.angvel, true);
         self.parameters.dt = dt_s as f32;
-        workspace.pipeline.step(
+        self.workspace.pipeline.step(
             EngineVector::ZERO,
             &self.parameters,
             &mut self.islands,
@@ -204,12 +241,90 @@ impl Engine {
             &mut self.impulse_joints,
             &mut self.multibody_joints,
             &mut self.soft_bodies,
-            &mut workspace.ccd_solver,
+            &mut self.workspace.ccd_solver,
             &(),
             &(),
         );
+        let body = &self.bodies[self.robot];
+        *motion = Motion { pose: *body.position(), linvel: body.linvel(), angvel: body.angvel() };
         self.narrow_phase
             .contact_pairs_with(self.robot_shape)
             .any(|pair| pair.total_impulse_magnitude() > 0.0)
+    }
+}
+
+/// Buffers that the engine reuses; no state of the simulation.
+#[derive(Default)]
+struct Workspace {
+    pipeline: PhysicsPipeline,
+    ccd_solver: CCDSolver,
+}
+
+impl Clone for Workspace {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, RngExt};
+    use sharp_space::{GridFrame, Heading, Occupancy, OccupancyGrid, Pose, Seed, Vector};
+
+    use super::*;
+
+    /// A square of 40 m with pillars of half a metre every five, turned and far from the origin.
+    fn pillars() -> OccupancyGrid {
+        let origin = Pose::new(100.0, -50.0, 1.0);
+        let frame = GridFrame { origin, resolution_m: 0.1, width: 400, height: 400 };
+        let is_pillar = |index| index % 50 < 5;
+        let cells = (0..frame.len()).map(|index| match frame.cell(index) {
+            cell if is_pillar(cell.col) && is_pillar(cell.row) => Occupancy::Occupied,
+            _ => Occupancy::Free,
+        });
+        OccupancyGrid::new(frame, cells.collect()).expect("a sound grid")
+    }
+
+    fn random_command(stream: &mut impl Rng) -> Command {
+        Command::Twist {
+            speed_mps: stream.random_range(0.0..1.0),
+            yaw_rate_radps: stream.random_range(-2.0..2.0),
+        }
+    }
+
+    #[test]
+    fn gliding_and_the_engine_agree_bit_for_bit_until_a_wall_is_met() {
+        for (robot, dt_s) in [
+            (RobotModel::husky(), 1.0 / 60.0),
+            (RobotModel::husky(), 1.0 / 240.0),
+            (RobotModel::limo(), 1.0 / 60.0),
+            (RobotModel::limo(), 1.0 / 20.0),
+        ] {
+            let world = Arc::new(World::new(&pillars(), robot.footprint));
+            let mut sim = PlanarSim::new(world.clone(), &robot);
+            let mut always = PlanarSim { felt_within_m: f64::INFINITY, ..PlanarSim::new(world, &robot) };
+            let stream = &mut Seed(3).stream("commands", 0);
+            let (mut glided, mut near) = (0, 0);
+            for _ in 0..50 {
+                let start = sim.world.frame().from_grid(Vector::new(225.0, 225.0));
+                let start = RobotState::rolling(Pose::at(start, Heading::new(0.3)), 0.3);
+                sim.reset(start);
+                always.reset(start);
+                let mut command = random_command(stream);
+                for step in 0..1500 {
+                    if step % 40 == 0 {
+                        command = random_command(stream);
+                    }
+                    let (ours, theirs) = (sim.step(command, dt_s), always.step(command, dt_s));
+                    assert_eq!(ours, theirs, "{} at {dt_s} s, step {step}", robot.name);
+                    assert_eq!(sim.state(), always.state(), "{} at {dt_s} s, step {step}", robot.name);
+                    if ours.in_contact {
+                        break;
+                    }
+                    if sim.engine.is_some() { near += 1 } else { glided += 1 }
+                }
+            }
+            assert!(glided > 1000 && near > 100, "{}: {glided} steps glided, {near} not", robot.name);
+        }
     }
 }

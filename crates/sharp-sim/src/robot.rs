@@ -7,13 +7,24 @@ use serde::{Deserialize, Serialize};
 use sharp_space::{Footprint, FootprintError};
 use thiserror::Error;
 
+use crate::description::{self, SyntaxError};
+
+/// Longer names do not fit a table.
+const NAME_MAX: usize = 64;
+
 /// Why a robot's description was refused.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RobotError {
     /// The text is not a robot in RON.
     #[error("robot description: {0}")]
-    Syntax(#[from] ron::error::SpannedError),
+    Syntax(#[from] SyntaxError),
+    /// The name says nothing.
+    #[error("robot name is {name:?}, must be 1 to {NAME_MAX} characters that can be printed")]
+    Name {
+        /// The name.
+        name: String,
+    },
     /// The outline is impossible.
     #[error("robot {robot:?}: {source}")]
     Footprint {
@@ -115,7 +126,7 @@ impl RobotModel {
     /// Returns an error that names the first unreadable place, or the first field out of range, its
     /// value and what would be right.
     pub fn from_ron(text: &str) -> Result<Self, RobotError> {
-        let robot: Self = ron::from_str(text)?;
+        let robot: Self = description::parse(text)?;
         robot.validate()?;
         Ok(robot)
     }
@@ -166,6 +177,10 @@ impl RobotModel {
     }
 
     fn validate(&self) -> Result<(), RobotError> {
+        let length = self.name.chars().count();
+        if !(1..=NAME_MAX).contains(&length) || self.name.chars().any(char::is_control) {
+            return Err(RobotError::Name { name: self.name.clone() });
+        }
         Footprint::rectangle(self.footprint.half_length_m(), self.footprint.half_width_m())
             .map_err(|source| RobotError::Footprint { robot: self.name.clone(), source })?;
         let positive = |field, value, max| self.require(field, value, f64::MIN_POSITIVE, max);
@@ -267,7 +282,20 @@ mod tests {
             LIMO,
             "mass_kg: 4.8",
             "mas_kg: 4.8",
-            "robot description: 7:5-7:11: Unexpected field named `mas_kg`",
+            "robot description: line 7 \"mas_kg: 4.8,\": Unexpected field named `mas_kg`",
         );
+        refuse(
+            HUSKY,
+            "mass_kg: 46.0",
+            "mass_kg: \"heavy\"",
+            r#"robot description: line 7 "mass_kg: \"heavy\",": Expected float"#,
+        );
+        refuse(
+            HUSKY,
+            "    mass_kg: 46.0,\n",
+            "",
+            "robot description: line 17 \")\": Unexpected missing field named `mass_kg`",
+        );
+        refuse(HUSKY, "\"husky\"", "\"\"", "robot name is \"\", must be 1 to 64 characters");
     }
 }

@@ -52,10 +52,13 @@ pub enum SimulatorKind {
 #[non_exhaustive]
 pub enum UnknownSimulator {
     /// There is none of that name.
-    #[error("simulator {0:?} is unknown, must be kinematic, planar (rapier2d) or rigid (rapier3d)")]
+    #[error("simulator {0:?} is unknown, must be rapier2d (or planar), kinematic or rapier3d (or rigid)")]
     Name(String),
     /// It was left out of this build.
-    #[error("simulator {0:?} is not compiled in; build with --features rigid3d")]
+    #[error(
+        "simulator {0:?} is not compiled in, must be rapier2d or kinematic; \
+         cargo build --release -p sharp-cli --features rigid3d adds it"
+    )]
     NotCompiled(String),
 }
 
@@ -153,14 +156,15 @@ mod tests {
         }
         let error = "bullet".parse::<SimulatorKind>().map_err(|error| error.to_string());
         let message =
-            "simulator \"bullet\" is unknown, must be kinematic, planar (rapier2d) or rigid (rapier3d)";
+            "simulator \"bullet\" is unknown, must be rapier2d (or planar), kinematic or rapier3d (or rigid)";
         assert_eq!(error, Err(message.into()), "bullet");
     }
 
     #[test]
     fn rapier3d_is_there_or_says_how_to_get_it() {
         let found = "rapier3d".parse::<SimulatorKind>().map(|kind| kind.to_string());
-        let message = "simulator \"rapier3d\" is not compiled in; build with --features rigid3d";
+        let message = "simulator \"rapier3d\" is not compiled in, must be rapier2d or kinematic; \
+            cargo build --release -p sharp-cli --features rigid3d adds it";
         match found.map_err(|error| error.to_string()) {
             Ok(name) => assert_eq!((name.as_str(), cfg!(feature = "rigid3d")), ("rigid", true)),
             Err(error) => assert_eq!((error.as_str(), cfg!(feature = "rigid3d")), (message, false)),

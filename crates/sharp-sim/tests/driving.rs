@@ -451,6 +451,38 @@ fn a_fork_continues_bit_for_bit() {
 }
 
 #[test]
+fn one_thread_and_two_give_equal_bits() {
+    for kind in KINDS {
+        let run = |number: u64| {
+            let mut vehicle = noisy(kind, RobotModel::husky());
+            vehicle.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)), Seed(5), number);
+            episode(&mut vehicle, 20)
+        };
+        let alone: Vec<_> = (0..8).map(run).collect();
+        let by_two: Vec<_> = std::thread::scope(|scope| {
+            let halves = [0..4, 4..8].map(|half| scope.spawn(|| half.map(run).collect::<Vec<_>>()));
+            halves.into_iter().flat_map(|half| half.join().expect("the thread does not panic")).collect()
+        });
+        assert_eq!(alone, by_two, "{kind}");
+    }
+}
+
+#[test]
+fn the_engine_continues_from_a_snapshot_but_for_rounding() {
+    // The engine holds headings as (cos, sin) in single precision, a snapshot as an angle.
+    for robot in [RobotModel::husky(), RobotModel::limo()] {
+        let mut original = vehicle(SimulatorKind::Planar, &plain(), robot, NoiseModel::biased());
+        original.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)), Seed(5), 3);
+        episode(&mut original, 11);
+        let mut restored = original.clone();
+        restored.restore(&original.snapshot());
+        let (ours, theirs) = (episode(&mut restored, 20), episode(&mut original, 20));
+        let apart_m = ours.iter().zip(&theirs).map(|(a, b)| a.pose.distance_m(&b.pose)).fold(0.0, f64::max);
+        assert!(apart_m < 1e-4, "{}: {apart_m} m apart within 10 s", original.robot().name);
+    }
+}
+
+#[test]
 fn a_snapshot_survives_a_file() {
     for robot in [RobotModel::husky(), RobotModel::limo()] {
         let mut original = noisy(SimulatorKind::Kinematic, robot.clone());

@@ -8,7 +8,7 @@ use sharp_plan::{
     Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, Query,
     RoutePlanner, Rrt, Sac, SacBudget, Tally, Track, TrackSettings, Workspace, compare,
 };
-use sharp_sim::{NoiseModel, SimulatorKind};
+use sharp_sim::NoiseModel;
 use sharp_space::Seed;
 
 use crate::args::{Baseline, Collisions, Method};
@@ -114,10 +114,7 @@ pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failur
 }
 
 fn comparison(args: &Baseline, noise: NoiseModel, seed: u64) -> Result<ComparisonSettings, Failure> {
-    let simulator = args
-        .simulator
-        .parse::<SimulatorKind>()
-        .map_err(|error| Failure::new("USAGE", format!("--simulator: {error}")))?;
+    let simulator = input::simulator(&args.simulator)?;
     Ok(ComparisonSettings {
         episodes: args.episodes,
         simulator,

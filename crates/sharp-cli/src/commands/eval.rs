@@ -54,7 +54,7 @@ struct ResultLine {
 }
 
 pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let cases = cases(args.suite)?;
+    let cases = selected(cases(args.suite)?, args)?;
     let path = args.out.join("results.jsonl");
     let mut lines = read_lines(&path)?;
     let progress = bar(cases.len() as u64, "evaluating");
@@ -109,6 +109,30 @@ fn cases(suite: Suite) -> Result<Vec<Case>, Failure> {
             }
         }
     }
+    Ok(cases)
+}
+
+/// The cases that `args` asks for; a name that selects nothing is an error.
+fn selected(mut cases: Vec<Case>, args: &Eval) -> Result<Vec<Case>, Failure> {
+    for (flag, names, known) in [
+        ("--envs", &args.envs, cases.iter().map(|case| case.env.as_str()).collect::<Vec<_>>()),
+        ("--robots", &args.robots, cases.iter().map(|case| case.robot).collect()),
+    ] {
+        if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
+            return Err(Failure::new("USAGE", format!("{flag}: the suite has no {name:?}")));
+        }
+    }
+    if let Some(number) =
+        args.problems.iter().find(|&&number| cases.iter().all(|case| case.problem != number))
+    {
+        return Err(Failure::new("USAGE", format!("--problems: the suite has no problem {number}")));
+    }
+    cases.retain(|case| {
+        (args.envs.is_empty() || args.envs.contains(&case.env))
+            && (args.robots.is_empty() || args.robots.iter().any(|name| name == case.robot))
+            && args.options.is_none_or(|kind| kind == case.kind)
+            && (args.problems.is_empty() || args.problems.contains(&case.problem))
+    });
     Ok(cases)
 }
 

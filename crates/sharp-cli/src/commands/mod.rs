@@ -5,6 +5,7 @@ pub(crate) mod baseline;
 pub(crate) mod eval;
 pub(crate) mod library;
 pub(crate) mod map;
+pub(crate) mod prior;
 pub(crate) mod regions;
 pub(crate) mod run;
 pub(crate) mod serve;

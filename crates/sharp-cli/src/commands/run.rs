@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use sharp_maps::{LoadOptions, load};
 use sharp_plan::{Plan, RunSettings, run as run_plan, write_atomic};
-use sharp_sim::SimulatorKind;
 use sharp_space::Seed;
 
 use crate::args::{Collisions, Run, Switch};
@@ -15,12 +14,10 @@ use crate::report::RunReport;
 use crate::{input, pictures, progress};
 
 pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let simulator = input::simulator(&args.simulator)?;
     let plan = Arc::new(load_plan(&args.plan_dir)?);
     let mut settings = RunSettings::new(&plan, args.episodes, Seed(seed));
-    settings.simulator = args
-        .simulator
-        .parse::<SimulatorKind>()
-        .map_err(|error| Failure::new("USAGE", format!("--simulator: {error}")))?;
+    settings.simulator = simulator;
     if let Some(noise) = &args.noise {
         settings.noise = input::noise(noise)?;
     }

@@ -1,5 +1,5 @@
 //! The maps that the benches and the comparison with other simulators drive on: cells of 0.1 m, the
-//! world's origin in the middle, seven metres around it clear.
+//! world's origin in the middle, seven metres around it clear but for a slab to push against.
 
 use rand::RngExt;
 use sharp_space::floorplan::{FloorplanKind, generate};
@@ -8,6 +8,11 @@ use sharp_space::{Cell, GridFrame, Occupancy, OccupancyGrid, Pose, Seed};
 /// Half the side of the clear square, metres.
 const CLEAR_M: f64 = 3.5;
 const RESOLUTION_M: f64 = 0.1;
+
+/// Where the slab begins, metres to the right of the origin; it is a cell thick.
+const SLAB_M: f64 = 3.3;
+/// Half its length along y, metres.
+const SLAB_HALF_M: f64 = 0.5;
 
 /// The map called `name`: `free`, boxes that do not touch (`boxes_N`) or furnished rooms (`grid_SIDE`).
 pub(crate) fn map(name: &str) -> Option<OccupancyGrid> {
@@ -43,14 +48,18 @@ fn boxes(side_m: f64, count: usize) -> OccupancyGrid {
             placed += 1;
         }
     }
+    let slab = (0..frame.len()).filter(|&index| is_slab(&frame, frame.cell(index)));
+    slab.for_each(|index| cells[index] = Occupancy::Occupied);
     OccupancyGrid::new(frame, cells).expect("a sound grid")
 }
 
 fn rooms(side_m: f64) -> OccupancyGrid {
     let plan = generate(FloorplanKind::FurnishedRooms, side_m, RESOLUTION_M, &mut Seed(1).stream("rooms", 0));
     let frame = frame(plan.frame().width);
-    let cells = plan.cells().iter().enumerate().map(|(index, &occupancy)| {
-        if is_clear(&frame, frame.cell(index)) { Occupancy::Free } else { occupancy }
+    let cells = plan.cells().iter().enumerate().map(|(index, &occupancy)| match frame.cell(index) {
+        cell if is_slab(&frame, cell) => Occupancy::Occupied,
+        cell if is_clear(&frame, cell) => Occupancy::Free,
+        _ => occupancy,
     });
     OccupancyGrid::new(frame, cells.collect()).expect("a sound grid")
 }
@@ -64,4 +73,9 @@ fn frame(side: usize) -> GridFrame {
 fn is_clear(frame: &GridFrame, cell: Cell) -> bool {
     let center = frame.center(cell);
     center.x.abs().max(center.y.abs()) < CLEAR_M
+}
+
+fn is_slab(frame: &GridFrame, cell: Cell) -> bool {
+    let center = frame.center(cell);
+    (SLAB_M..SLAB_M + RESOLUTION_M).contains(&center.x) && center.y.abs() < SLAB_HALF_M
 }

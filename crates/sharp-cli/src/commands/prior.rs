@@ -1,0 +1,300 @@
+//! `sharp prior train|score`: the policy that every option begins with.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
+
+use rand::RngExt;
+use rayon::prelude::*;
+use serde::Serialize;
+use sharp_options::{OptionKind, OptionSet, OptionSettings};
+use sharp_plan::prior::{self, Course, CourseTask};
+use sharp_plan::{Abstraction, Follower, OptionPolicy, PacedFollower, Prior, Query, Workspace, write_atomic};
+use sharp_rl::{Progress, TrainSettings, TrainState, fine_tune, resume, train};
+use sharp_sim::{NoiseModel, RobotModel};
+use sharp_space::floorplan::{FloorplanKind, generate};
+use sharp_space::{GridFrame, OccupancyGrid, Pose, Seed, Stream};
+
+use crate::args::{PriorCommand, PriorScore, PriorTrain};
+use crate::outcome::{Exit, Failure, say, to_json};
+use crate::{input, pipeline, progress};
+
+/// Side of the maps, metres.
+const MAP_M: f64 = 15.0;
+/// Cell of the maps, metres.
+const CELL_M: f64 = 0.05;
+/// A small robot also sees maps shrunk by this: corridors as tight for it as for a large one.
+const SHRUNK: f64 = 0.55;
+/// Problems drawn in each map.
+const QUERIES: u64 = 6;
+/// The shortest problem worth planning, metres.
+const QUERY_MIN_M: f64 = 5.0;
+/// Environments that learn side by side.
+const ENVIRONMENTS: u64 = 32;
+/// Kinds of map that scores are taken on and no prior is trained on.
+const HELD_OUT: [FloorplanKind; 4] = [
+    FloorplanKind::FurnishedRooms,
+    FloorplanKind::RingCorridor,
+    FloorplanKind::OffsetWalls,
+    FloorplanKind::RoomGrid,
+];
+
+/// `sharp.prior.train/1`.
+#[derive(Serialize)]
+struct TrainReport {
+    schema: &'static str,
+    robot: String,
+    seed: u64,
+    file: String,
+    maps: u32,
+    courses: usize,
+    env_steps: u64,
+    gradient_steps: u64,
+    success: f64,
+    time_s: TrainTimes,
+}
+
+#[derive(Serialize)]
+struct TrainTimes {
+    courses: f64,
+    train: f64,
+    total: f64,
+}
+
+/// `sharp.prior.score/1`.
+#[derive(Serialize)]
+struct ScoreReport {
+    schema: &'static str,
+    robot: String,
+    noise: String,
+    legs: usize,
+    episodes: u32,
+    policies: BTreeMap<String, PolicyScore>,
+}
+
+/// How a policy did on its own, leg by leg.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+struct PolicyScore {
+    success: f64,
+    /// Share of the legs on which it held at least 99 %.
+    legs_at_99: f64,
+    worst_leg: f64,
+    mean_sim_time_s: f64,
+}
+
+pub(crate) fn run(command: &PriorCommand, seed: u64, json: bool) -> Result<Exit, Failure> {
+    match command {
+        PriorCommand::Train(args) => run_train(args, seed, json),
+        PriorCommand::Score(args) => run_score(args, seed, json),
+    }
+}
+
+fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let begun = Instant::now();
+    let robot = input::robot(&args.robot)?;
+    let kinds: Vec<_> = FloorplanKind::ALL.into_iter().filter(|kind| !HELD_OUT.contains(kind)).collect();
+    let bar = progress::bar(u64::from(args.maps), "planning courses");
+    let courses = Arc::new(courses(&robot, &kinds, args.maps, Seed(seed).child("prior", 0), &bar)?);
+    bar.finish_and_clear();
+    let courses_s = begun.elapsed().as_secs_f64();
+    let settings = TrainSettings {
+        max_env_steps: args.steps.unwrap_or(prior::train_settings().max_env_steps),
+        ..prior::train_settings()
+    };
+    let noises = Arc::new(vec![NoiseModel::nominal(), NoiseModel::harsh(), NoiseModel::biased()]);
+    let task = |index| {
+        let seed = Seed(seed).child("environment", index);
+        CourseTask::new(Arc::clone(&courses), Arc::clone(&noises), seed)
+    };
+    let mut tasks: Vec<CourseTask> = (0..ENVIRONMENTS).map(task).collect();
+    let bar = progress::bar(settings.max_env_steps, "learning");
+    let mut interrupted_state = None;
+    let mut observer = |progress: &Progress<'_>| {
+        bar.set_position(progress.state.env_steps);
+        if let Some(evaluation) = progress.evaluation {
+            let (steps, rate) = (progress.state.env_steps, evaluation.success_rate());
+            let text = format!("{steps} steps: {rate:.3}, {:.1} actions", evaluation.mean_steps);
+            bar.suspend(|| eprintln!("{text}"));
+            bar.set_message(format!("{rate:.3}"));
+        }
+        if !progress::is_interrupted() {
+            return ControlFlow::Continue(());
+        }
+        interrupted_state = Some(progress.state.to_bytes());
+        ControlFlow::Break(())
+    };
+    let mut rng = Seed(seed).stream("sac", 0);
+    let checkpoint = args.out.with_extension("state");
+    let trained = if checkpoint.exists() {
+        let bytes = std::fs::read(&checkpoint).map_err(anyhow::Error::from)?;
+        let state = TrainState::from_bytes(&bytes)
+            .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", checkpoint.display())))?;
+        resume(&mut tasks, state, &settings, &mut observer)
+    } else if let Some(from) = &args.from {
+        let bytes = std::fs::read(from).map_err(anyhow::Error::from)?;
+        let prior = Prior::from_bytes(&bytes)
+            .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", from.display())))?;
+        fine_tune(&mut tasks, prior.networks(), &settings, &mut rng, &mut observer)
+    } else {
+        train(&mut tasks, &settings, &mut rng, &mut observer)
+    }
+    .map_err(|error| Failure::new("TRAINING", error.to_string()))?;
+    bar.finish_and_clear();
+    if let Some(state) = interrupted_state {
+        write_atomic(&checkpoint, &state)?;
+        return Ok(Exit::Interrupted);
+    }
+    write_atomic(&args.out, &Prior::new(trained.sac).to_bytes())?;
+    // Only now: a crash before would have lost both.
+    let _ = std::fs::remove_file(&checkpoint);
+    let total = begun.elapsed().as_secs_f64();
+    let report = TrainReport {
+        schema: "sharp.prior.train/1",
+        robot: robot.name,
+        seed,
+        file: args.out.display().to_string(),
+        maps: args.maps,
+        courses: courses.len(),
+        env_steps: trained.env_steps,
+        gradient_steps: trained.updates,
+        success: trained.evaluation.success_rate(),
+        time_s: TrainTimes { courses: courses_s, train: total - courses_s, total },
+    };
+    if json {
+        say!("{}", to_json(&report));
+    } else {
+        say!("{}: {:.3} of the last evaluation's episodes, {total:.0} s", report.file, report.success);
+    }
+    Ok(Exit::Done)
+}
+
+/// Courses in `maps` generated maps of `kinds` in turn.
+fn courses(
+    robot: &RobotModel,
+    kinds: &[FloorplanKind],
+    maps: u32,
+    seed: Seed,
+    bar: &indicatif::ProgressBar,
+) -> Result<Vec<Course>, Failure> {
+    let of_map = |index: u32| -> Result<Vec<Course>, Failure> {
+        let map_seed = seed.child("map", u64::from(index));
+        let rng = &mut map_seed.stream("draw", 0);
+        let mut grid = generate(kinds[index as usize % kinds.len()], MAP_M, CELL_M, rng);
+        if !robot.can_turn_in_place() && (index as usize / kinds.len()).is_multiple_of(2) {
+            grid = shrunk(&grid);
+        }
+        let workspace = Workspace::new(grid, robot.clone());
+        let kind = if index.is_multiple_of(2) { OptionKind::Interface } else { OptionKind::Centroid };
+        let Ok(abstraction) = abstraction(&workspace, kind) else { return Ok(vec![]) };
+        let queries: Vec<Query> = (0..QUERIES).filter_map(|_| query(&workspace, rng)).collect();
+        bar.inc(1);
+        Ok(prior::courses(&workspace, &abstraction, &queries, map_seed))
+    };
+    let all: Result<Vec<_>, Failure> = (0..maps).into_par_iter().map(of_map).collect();
+    Ok(all?.into_iter().flatten().collect())
+}
+
+fn shrunk(grid: &OccupancyGrid) -> OccupancyGrid {
+    let frame = GridFrame { resolution_m: SHRUNK * grid.frame().resolution_m, ..*grid.frame() };
+    OccupancyGrid::new(frame, grid.cells().to_vec()).expect("as many cells as before")
+}
+
+fn abstraction(workspace: &Workspace, kind: OptionKind) -> Result<Abstraction, Failure> {
+    let (_, regions, _) = pipeline::regions(workspace, "geometric")?;
+    let rbvd = pipeline::diagram(workspace, &regions, crate::args::Metric::Geodesic)?;
+    let settings =
+        OptionSettings { endpoint_radius_m: workspace.robot.goal_tolerance_m, ..OptionSettings::default() };
+    let options = OptionSet::synthesize(&rbvd, kind, &settings);
+    Ok(Abstraction { rbvd: Arc::new(rbvd), options: Arc::new(options) })
+}
+
+/// A problem with room at both ends.
+fn query(workspace: &Workspace, rng: &mut Stream) -> Option<Query> {
+    let start = place(workspace, rng)?;
+    let goal = place(workspace, rng)?;
+    (start.distance_m(&goal) >= QUERY_MIN_M).then_some(Query { start, goal })
+}
+
+fn place(workspace: &Workspace, rng: &mut Stream) -> Option<Pose> {
+    let bounds = workspace.grid.frame().bounds();
+    let room_m = workspace.robot.footprint.circumscribed_radius_m() + 0.05;
+    for _ in 0..1000 {
+        let x = rng.random_range(bounds.min.x..bounds.max.x);
+        let y = rng.random_range(bounds.min.y..bounds.max.y);
+        let pose = Pose::new(x, y, rng.random_range(-std::f64::consts::PI..std::f64::consts::PI));
+        if workspace.checker.field().sample(pose.position) > room_m {
+            return Some(pose);
+        }
+    }
+    None
+}
+
+fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let robot = input::robot(&args.robot)?;
+    let noise = input::noise(&args.noise)?;
+    let bar = progress::bar(u64::from(args.maps), "planning courses");
+    let courses = courses(&robot, &HELD_OUT, args.maps, Seed(seed).child("prior score", 0), &bar)?;
+    bar.finish_and_clear();
+    let prior = match &args.from {
+        None => Prior::shipped(&robot).clone(),
+        Some(file) => {
+            let bytes = std::fs::read(file).map_err(anyhow::Error::from)?;
+            Prior::from_bytes(&bytes)
+                .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", file.display())))?
+        }
+    };
+    let mut policies = BTreeMap::new();
+    for (name, policy) in candidates(&prior, &robot, &noise) {
+        let trials: Vec<_> = courses
+            .iter()
+            .flat_map(|course| course.certify(&policy, &noise, args.episodes, Seed(seed)))
+            .collect();
+        policies.insert(name, policy_score(&trials));
+    }
+    let legs = courses.iter().map(Course::len).sum();
+    let report = ScoreReport {
+        schema: "sharp.prior.score/1",
+        robot: robot.name,
+        noise: args.noise.clone(),
+        legs,
+        episodes: args.episodes,
+        policies,
+    };
+    if json {
+        say!("{}", to_json(&report));
+        return Ok(Exit::Done);
+    }
+    say!("| policy | success | legs at 99 % | worst leg | mean time s |\n|---|---|---|---|---|");
+    for (name, score) in &report.policies {
+        let PolicyScore { success, legs_at_99, worst_leg, mean_sim_time_s } = score;
+        say!("| {name} | {success:.4} | {legs_at_99:.2} | {worst_leg:.2} | {mean_sim_time_s:.2} |");
+    }
+    Ok(Exit::Done)
+}
+
+/// Every policy that an option may be given without learning, by a name that sorts.
+fn candidates(prior: &Prior, robot: &RobotModel, noise: &NoiseModel) -> Vec<(String, OptionPolicy)> {
+    let named = |kind: &str, policies: Vec<OptionPolicy>| {
+        let name = |(index, policy)| (format!("{kind} {index:02}"), policy);
+        policies.into_iter().enumerate().map(name).collect::<Vec<_>>()
+    };
+    let followers = Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
+    let paced = PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced).collect();
+    let mut all = named("prior", prior.candidates(robot, noise));
+    all.extend(named("follower", followers));
+    all.extend(named("paced", paced));
+    all
+}
+
+fn policy_score(trials: &[sharp_plan::Certificate]) -> PolicyScore {
+    let count = trials.len().max(1) as f64;
+    let rates = || trials.iter().map(|trial| trial.tally.rate());
+    let timed: Vec<f64> = trials.iter().map(|trial| trial.mean_time_s).filter(|s| s.is_finite()).collect();
+    PolicyScore {
+        success: rates().sum::<f64>() / count,
+        legs_at_99: rates().filter(|&rate| rate >= 0.99).count() as f64 / count,
+        worst_leg: rates().fold(1.0, f64::min),
+        mean_sim_time_s: timed.iter().sum::<f64>() / timed.len().max(1) as f64,
+    }
+}
