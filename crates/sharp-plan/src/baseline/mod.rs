@@ -13,6 +13,9 @@ mod rrt;
 mod sac;
 mod track;
 
+#[cfg(test)]
+mod tests;
+
 use std::sync::Arc;
 
 use rayon::prelude::*;

@@ -137,3 +137,66 @@ impl Trim {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_sim::RobotModel;
+
+    use super::*;
+
+    const AHEAD: PolarWaypoint = PolarWaypoint { reach_m: 0.5, bearing_rad: 0.0, speed_mps: 0.5 };
+
+    /// What an observer believes after 60 actions of a robot that is like `truth`.
+    fn believed(robot: &RobotModel, truth: &Traits) -> Observer {
+        let model = Model::new(robot);
+        let noise = NoiseModel { gain_sd: 0.05, waypoint_sd_m: 0.01, ..NoiseModel::harsh() };
+        let mut observer = Observer::new(model.clone(), &noise);
+        let mut state = RobotState::at_rest(Pose::new(0.0, 0.0, 0.0));
+        for i in 0..60 {
+            let command = PolarWaypoint { bearing_rad: 0.5 * (f64::from(i) * 0.7).sin(), ..AHEAD };
+            observer.begin(&state, command);
+            model.act(&mut state, command, truth, |_| true);
+            observer.end(&state, false);
+        }
+        observer
+    }
+
+    #[test]
+    fn slip_and_pull_are_recognised() {
+        for robot in [RobotModel::husky(), RobotModel::limo()] {
+            for drift_radps in [-0.3, 0.0, 0.3] {
+                let truth = Traits { speed_share: 0.6, yaw_share: 0.8, drift_radps };
+                let found = *believed(&robot, &truth).traits();
+                assert!((found.speed_share - 0.6).abs() < 0.05, "{}: {found:?}", robot.name);
+                assert!((found.yaw_share - 0.8).abs() < 0.1, "{}: {found:?}", robot.name);
+                assert!((found.drift_radps - drift_radps).abs() < 0.05, "{}: {found:?}", robot.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_trimmed_robot_drives_straight_ahead() {
+        for robot in [RobotModel::husky(), RobotModel::limo()] {
+            let truth = Traits { speed_share: 0.6, yaw_share: 0.8, drift_radps: 0.3 };
+            let command = believed(&robot, &truth).trim(AHEAD, 1.0).applied(AHEAD);
+            let mut state = RobotState::at_rest(Pose::new(0.0, 0.0, 0.0));
+            state.wheel_speed_mps = 0.5;
+            let plain_rad = Model::new(&robot).turn_rad(&state, AHEAD, &truth);
+            let trimmed_rad = Model::new(&robot).turn_rad(&state, command, &truth);
+            assert!(plain_rad > 0.02, "{} is pulled to the left: {plain_rad}", robot.name);
+            assert!(trimmed_rad.abs() < 0.6 * plain_rad, "{}: {trimmed_rad} of {plain_rad}", robot.name);
+            assert!(command.bearing_rad < 0.0, "{} steers against it", robot.name);
+            assert!((command.speed_mps - 0.5 / 0.6).abs() < 0.1, "{} makes up for slip", robot.name);
+        }
+    }
+
+    #[test]
+    fn an_action_that_a_wall_ended_says_nothing() {
+        let mut observer =
+            believed(&RobotModel::husky(), &Traits { speed_share: 0.9, yaw_share: 0.9, drift_radps: 0.0 });
+        let before = *observer.traits();
+        observer.begin(&RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)), AHEAD);
+        observer.end(&RobotState::at_rest(Pose::new(0.0, 0.0, 1.0)), true);
+        assert_eq!(*observer.traits(), before);
+    }
+}

@@ -179,3 +179,49 @@ fn hops(path: &Path, workspace: &Workspace) -> (Vec<Hop>, f64) {
     to(last, &mut turn_rad);
     (hops, total_s)
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_sim::RobotModel;
+    use sharp_space::OccupancyGrid;
+
+    use super::*;
+
+    #[test]
+    fn corners_are_turned_at_before_the_next_point_is_driven_to() {
+        let grid = OccupancyGrid::from_ascii(1.0, "....\n....\n....\n....").expect("a sound drawing");
+        let workspace = Workspace::new(grid, RobotModel::husky());
+        // A metre to the east, a turn to the left, and half a metre to the north.
+        let ahead = (0..=20).map(|i| Pose::new(1.0 + 0.05 * f64::from(i), 1.0, 0.0));
+        let left = (0..=10).map(|i| Pose::new(2.0, 1.0 + 0.05 * f64::from(i), std::f64::consts::FRAC_PI_2));
+        let path = Path::new(ahead.chain(left).collect()).expect("it holds poses");
+        let (hops, total_s) = hops(&path, &workspace);
+        let points: Vec<_> = hops.iter().map(|hop| (hop.point.x, hop.point.y, hop.speed_mps)).collect();
+        let expected = [(1.5, 1.0, 0.5), (2.0, 1.0, 0.5), (2.0, 1.5, TURN_MPS), (2.0, 1.5, 0.5)];
+        assert_eq!(points.len(), expected.len(), "{points:?}");
+        for (found, wanted) in points.iter().zip(expected) {
+            let off = (found.0 - wanted.0).abs() + (found.1 - wanted.1).abs() + (found.2 - wanted.2).abs();
+            assert!(off < 0.06, "{found:?}, expected {wanted:?}");
+        }
+        assert!((total_s - (1.5 / 0.5 + std::f64::consts::FRAC_PI_2)).abs() < 0.01, "{total_s} s");
+    }
+
+    #[test]
+    fn a_point_is_left_behind_when_reached_passed_or_given_up() {
+        let hop = |actions| Hop {
+            point: Point::new(1.0, 0.0),
+            along: Vector::new(1.0, 0.0),
+            speed_mps: 0.5,
+            actions,
+        };
+        for (x, y, actions, expected) in
+            [(0.0, 0.0, 3, false), (0.9, 0.1, 3, true), (1.1, 0.8, 3, true), (0.0, 0.0, 0, true)]
+        {
+            assert_eq!(
+                hop(actions).is_over(Point::new(x, y)),
+                expected,
+                "({x}, {y}), {actions} actions left"
+            );
+        }
+    }
+}
