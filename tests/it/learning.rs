@@ -45,8 +45,16 @@ fn the_papers_form_learns_an_easy_option() {
     let starts = Arc::new(Starts::spread(workspace, leg, &StartSpread::default(), 256, Seed(1)));
     let noise = NoiseModel::by_name("nominal").expect("a built-in noise");
     let settings = small_budget();
-    let lesson =
-        Lesson { workspace, leg, next: None, starts, noise: &noise, settings: &settings, seed: Seed(1) };
+    let lesson = Lesson {
+        workspace,
+        leg,
+        next: None,
+        tail: &[],
+        starts,
+        noise: &noise,
+        settings: &settings,
+        seed: Seed(1),
+    };
 
     let idle = OptionPolicy::Follower(Follower { rule: Rule::Pursuit { look_ahead_m: 0.5 }, speed_mps: 0.0 });
     assert_eq!(lesson.certify(&idle).tally.successes, 0, "standing still reaches nothing");

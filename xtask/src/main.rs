@@ -5,6 +5,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "a development tool reads arguments, clock and environment")]
 
+mod baselines;
 mod bench;
 mod ci;
 mod eval;
@@ -31,6 +32,8 @@ usage: cargo xtask COMMAND
   train-prior [ARGS]     sharp prior train ARGS, for both robots by default
   eval [--profile smoke|quick|paper] [ARGS]
                          sharp eval of that suite
+  baselines [--noise N,..] [--methods M,..] [--envs E,..] [--episodes N] [--out DIR]
+                         sharp baseline on every problem, as tables; goes on where it was
   bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
   bench peers [sim|regions]
                          the same work here and in other programs, as JSON lines
@@ -52,6 +55,7 @@ fn main() -> ExitCode {
         "train-prior" => train_prior::run(rest),
         "train-regions" => train_regions::run(rest),
         "eval" => eval::run(rest),
+        "baselines" => baselines::run(rest),
         "bench" if rest.first().is_some_and(|word| word == "peers") => peers::run(&rest[1..]),
         "bench" => bench::run(rest),
         "help" | "-h" | "--help" => {

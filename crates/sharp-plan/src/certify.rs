@@ -5,9 +5,9 @@ use sharp_sim::{NoiseModel, RobotState, Simulator, Vehicle};
 use sharp_space::Seed;
 
 use crate::learn::kinematic_vehicle;
-use crate::percept::{Percept, Workspace};
+use crate::percept::Workspace;
 use crate::policy::DecisionScratch;
-use crate::rollout::{ChainRun, Driver, LegOutcome, drive_chain};
+use crate::rollout::{ChainRun, Driver, drive_chain};
 use crate::starts::Starts;
 use crate::stats::Tally;
 
@@ -18,6 +18,18 @@ pub struct Certificate {
     pub tally: Tally,
     /// Mean simulated time of the successful episodes, seconds; infinite without any.
     pub mean_time_s: f64,
+}
+
+/// What a failure costs, seconds: somebody has to walk there and free the robot.
+const FAILURE_S: f64 = 600.0;
+
+impl Certificate {
+    /// Seconds per success, and a price for each failure.
+    #[must_use]
+    pub fn cost_s(&self) -> f64 {
+        let success = self.tally.rate().max(1e-3);
+        self.mean_time_s / success + FAILURE_S * (1.0 - success)
+    }
 }
 
 /// A trial: which world, which noise, how often, on which random streams.
@@ -37,13 +49,18 @@ impl Trial<'_> {
     /// Runs `driver` alone from `starts`.
     #[must_use]
     pub fn of_leg(&self, driver: &Driver<'_>, starts: &Starts) -> Certificate {
-        let horizon = driver.leg.horizon_actions(crate::SLOWEST_REACH_M);
+        self.of_legs(std::slice::from_ref(driver), starts)
+    }
+
+    /// Runs `drivers` one after the other from `starts`; a success is to arrive where the last one leads.
+    #[must_use]
+    pub fn of_legs(&self, drivers: &[Driver<'_>], starts: &Starts) -> Certificate {
         let ends =
             self.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
                 let state = starts.draw(&mut self.seed.stream("trial start", episode));
                 vehicle.reset(state, self.seed, episode);
-                let end = driver.drive(self.workspace, vehicle, Percept::first(state), horizon, scratch);
-                (end.outcome == LegOutcome::Done, end.time_s)
+                let run = drive_chain(self.workspace, vehicle, state, drivers, scratch);
+                (run.passed(drivers.len() - 1), run.times_s.iter().sum())
             });
         certificate(&ends)
     }

@@ -21,12 +21,10 @@ use crate::starts::Starts;
 use crate::stats::Tally;
 use crate::task::LegTask;
 
-/// What a failure costs, seconds: somebody has to walk there and free the robot.
-const FAILURE_S: f64 = 200.0;
-/// Candidates that are certified where none passes the screening.
+/// Candidates that are left after a first look.
+const CONTENDERS: usize = 8;
+/// Candidates that are certified.
 const FINALISTS: usize = 3;
-/// A candidate this much worse than the best in a first look is not looked at again.
-const KEEPS_UP: f64 = 0.1;
 /// Reward of a contact while a prior is trained on: what it was trained with at full caution.
 const FINE_CONTACT: f64 = -20.0;
 
@@ -47,6 +45,8 @@ pub struct LearnSettings {
     pub mode: LearningMode,
     /// Success wanted of an option, share of episodes.
     pub wanted_success: f64,
+    /// The prior is trained on a leg on which nothing else holds as often as this; 0 for never.
+    pub train_below: f64,
     /// Episodes in which candidates are compared.
     pub screening_episodes: u32,
     /// Fresh episodes that certify the chosen one.
@@ -65,6 +65,7 @@ impl LearnSettings {
             LearningMode::Fast => Self {
                 mode,
                 wanted_success: 0.99,
+                train_below: 0.98,
                 screening_episodes: 200,
                 certify_episodes: 1000,
                 environments: 16,
@@ -88,6 +89,7 @@ impl LearnSettings {
             LearningMode::Paper => Self {
                 mode,
                 wanted_success: 0.99,
+                train_below: 1.0,
                 screening_episodes: 20,
                 certify_episodes: 1000,
                 environments: 1,
@@ -118,14 +120,7 @@ impl Learnt {
     /// The paper takes the mean number of steps and knows no failure.
     #[must_use]
     pub fn cost_s(&self) -> f64 {
-        Self::cost_of(self.mean_time_s, self.verified)
-    }
-
-    /// The cost of a leg that takes `mean_time_s` where it succeeds and holds as `verified` says.
-    #[must_use]
-    pub(crate) fn cost_of(mean_time_s: f64, verified: Tally) -> f64 {
-        let success = verified.rate().max(1e-3);
-        mean_time_s / success + FAILURE_S * (1.0 - success)
+        Certificate { tally: self.verified, mean_time_s: self.mean_time_s }.cost_s()
     }
 }
 
@@ -204,6 +199,9 @@ pub struct Lesson<'a> {
     pub leg: &'a Arc<Leg>,
     /// The leg after it, where one is known: followers look ahead into its guide.
     pub next: Option<&'a Arc<Leg>>,
+    /// The legs after it with their policies, where they are known: a policy that arrives badly is a
+    /// bad one. The first of them is `next`.
+    pub tail: &'a [Driver<'a>],
     /// Where its episodes begin.
     pub starts: Arc<Starts>,
     /// The noise of the simulator.
@@ -236,76 +234,79 @@ impl Lesson<'_> {
         }
     }
 
-    fn driver<'b>(&'b self, policy: &'b OptionPolicy) -> Driver<'b> {
-        Driver { leg: self.leg, policy, next: self.next.map(|next| &next.guide) }
+    /// The leg under `policy`, and what comes after it.
+    fn drivers<'b>(&'b self, policy: &'b OptionPolicy) -> Vec<Driver<'b>> {
+        let first = Driver { leg: self.leg, policy, next: self.next.map(|next| &next.guide) };
+        std::iter::once(first).chain(self.tail.iter().copied()).collect()
     }
 
     /// What `policy` holds on the lesson's fresh episodes.
     #[must_use]
     pub fn certify(&self, policy: &OptionPolicy) -> Certificate {
-        self.trial(self.settings.certify_episodes, "certify", 0).of_leg(&self.driver(policy), &self.starts)
+        let trial = self.trial(self.settings.certify_episodes, "certify", 0);
+        trial.of_leg(&self.drivers(policy)[0], &self.starts)
     }
 
-    /// The fastest policy at hand that holds as wanted; where none does, the best one, trained on.
+    /// What `policy` is worth to the plan: what it and the legs after it hold, on fresh episodes.
+    #[must_use]
+    pub fn judge(&self, policy: &OptionPolicy) -> Certificate {
+        let trial = self.trial(self.settings.certify_episodes, "certify", 0);
+        trial.of_legs(&self.drivers(policy), &self.starts)
+    }
+
+    fn learnt(&self, policy: OptionPolicy, effort: (u64, u64)) -> Learnt {
+        let certificate = self.certify(&policy);
+        learnt(policy, certificate, effort)
+    }
+
+    /// The policy at hand that costs least and holds as wanted; where none does, the one that holds
+    /// most often, or what the prior learns on this leg.
     fn learn_fast(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
-        let mut screened = self.screen();
-        screened.sort_by(|a, b| a.1.mean_time_s.total_cmp(&b.1.mean_time_s));
-        let passes = |certificate: &Certificate| certificate.tally.rate() >= self.settings.wanted_success;
-        let mut best: Option<(OptionPolicy, Certificate)> = None;
-        for (policy, _) in screened.iter().filter(|(_, certificate)| passes(certificate)) {
+        let mut finalists: Vec<(Certificate, OptionPolicy)> = Vec::with_capacity(FINALISTS);
+        for policy in self.screen() {
             if stop() {
                 return Err(LearnFailure::Stopped);
             }
-            let certificate = self.certify(policy);
-            if passes(&certificate) {
-                return Ok(learnt(policy.clone(), certificate, (0, 0)));
-            }
-            keep_better(&mut best, policy.clone(), certificate);
+            finalists.push((self.judge(&policy), policy));
         }
-        // None holds. The best of the screening was lucky or is good: fresh episodes tell.
-        screened.sort_by(|a, b| b.1.tally.successes.cmp(&a.1.tally.successes));
-        for (policy, _) in screened.into_iter().take(FINALISTS) {
-            let certificate = self.certify(&policy);
-            keep_better(&mut best, policy, certificate);
+        finalists.sort_by(|a, b| a.0.cost_s().total_cmp(&b.0.cost_s()));
+        let passes = |judged: &Certificate| judged.tally.rate() >= self.settings.wanted_success;
+        if let Some(index) = finalists.iter().position(|(judged, _)| passes(judged)) {
+            return Ok(self.learnt(finalists.swap_remove(index).1, (0, 0)));
         }
-        let (policy, certificate) = best.expect("there are candidates");
-        if self.settings.train.max_env_steps == 0 {
-            return Ok(learnt(policy, certificate, (0, 0)));
+        // The first of equals: the one that costs least.
+        let best = finalists.into_iter().rev().max_by_key(|(judged, _)| judged.tally.successes);
+        let (judged, policy) = best.expect("there are candidates");
+        if judged.tally.rate() >= self.settings.train_below {
+            return Ok(self.learnt(policy, (0, 0)));
         }
         let trained = self.train_on(stop)?;
-        let effort = (trained.env_steps, trained.gradient_steps);
-        if certificate.tally.successes >= trained.verified.successes {
-            return Ok(learnt(policy, certificate, effort));
+        if self.judge(&trained.policy).tally.successes > judged.tally.successes {
+            return Ok(trained);
         }
-        Ok(trained)
+        Ok(self.learnt(policy, (trained.env_steps, trained.gradient_steps)))
     }
 
-    /// Everything that drives without learning, each on a number of episodes that grows while it
-    /// keeps up with the best.
-    fn screen(&self) -> Vec<(OptionPolicy, Certificate)> {
-        let screening = self.settings.screening_episodes;
-        let first = self.trial(screening.div_ceil(4), "first screen", 0);
+    /// What drives without learning: the few that cost least, each round on more episodes than the one
+    /// before it.
+    fn screen(&self) -> Vec<OptionPolicy> {
         let robot = &self.workspace.robot;
-        let mut candidates: Vec<OptionPolicy> =
+        let mut left: Vec<OptionPolicy> =
             Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
-        candidates.extend(PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced));
-        candidates.extend(Prior::shipped(robot).candidates(robot, self.noise));
-        let seen: Vec<_> = candidates
-            .into_iter()
-            .map(|policy| {
-                let certificate = first.of_leg(&self.driver(&policy), &self.starts);
-                (policy, certificate)
-            })
-            .collect();
-        let most = seen.iter().map(|(_, certificate)| certificate.tally.rate()).fold(0.0, f64::max);
-        let trial = self.trial(screening, "screen", 0);
-        seen.into_iter()
-            .filter(|(_, certificate)| certificate.tally.rate() >= most - KEEPS_UP)
-            .map(|(policy, _)| {
-                let certificate = trial.of_leg(&self.driver(&policy), &self.starts);
-                (policy, certificate)
-            })
-            .collect()
+        left.extend(PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced));
+        left.extend(Prior::shipped(robot).candidates(robot, self.noise));
+        let screening = self.settings.screening_episodes;
+        for (round, (episodes, keep)) in
+            [(screening.div_ceil(4), CONTENDERS), (screening, FINALISTS)].into_iter().enumerate()
+        {
+            let trial = self.trial(episodes, "screen", round as u64);
+            let cost_s = |policy: &OptionPolicy| trial.of_legs(&self.drivers(policy), &self.starts).cost_s();
+            let mut costs: Vec<(f64, OptionPolicy)> =
+                left.into_iter().map(|policy| (cost_s(&policy), policy)).collect();
+            costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+            left = costs.into_iter().take(keep).map(|(_, policy)| policy).collect();
+        }
+        left
     }
 
     /// The prior, trained further on this leg alone.
@@ -355,17 +356,6 @@ impl Lesson<'_> {
     }
 }
 
-/// Keeps the policy with more successes; the earlier one of equals.
-fn keep_better(
-    best: &mut Option<(OptionPolicy, Certificate)>,
-    policy: OptionPolicy,
-    certificate: Certificate,
-) {
-    if best.as_ref().is_none_or(|(_, best)| certificate.tally.successes > best.tally.successes) {
-        *best = Some((policy, certificate));
-    }
-}
-
 fn learnt(policy: OptionPolicy, certificate: Certificate, (env_steps, gradient_steps): (u64, u64)) -> Learnt {
     let Certificate { tally, mean_time_s } = certificate;
     Learnt { policy, verified: tally, mean_time_s, env_steps, gradient_steps }
@@ -384,7 +374,7 @@ mod tests {
         let with =
             |successes| Learnt { verified: Tally { episodes: 100, successes }, ..followed(&workspace) };
         assert_eq!(with(100).cost_s(), 5.0, "its mean time");
-        assert_eq!(with(50).cost_s(), 110.0, "twice the time and half of what a failure costs");
+        assert_eq!(with(50).cost_s(), 310.0, "twice the time and half of what a failure costs");
         assert!(with(0).cost_s() > 1000.0, "dear beyond use");
     }
 
@@ -420,6 +410,7 @@ mod tests {
             workspace: &workspace,
             leg,
             next: None,
+            tail: &[],
             starts,
             noise: &noise,
             settings: &settings,

@@ -8,7 +8,7 @@ use sharp_options::OptionKind;
 use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Seed;
 
-use crate::certify::Trial;
+use crate::certify::{Certificate, Trial};
 use crate::files::FileError;
 use crate::learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson};
 use crate::leg::{Leg, LegId, Role};
@@ -23,6 +23,8 @@ use crate::stats::Tally;
 const START_POOL: usize = 256;
 /// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
+/// Legs after a repaired one that judge how it arrives.
+const TAIL_LEGS: usize = 2;
 /// Gain below which a repaired policy counts as no better, share of episodes: luck explains less.
 const GAIN_MIN: f64 = 0.003;
 /// Plans run from end to end before the best of them is taken.
@@ -256,8 +258,8 @@ impl Run<'_> {
         let Self { planner, learnt, observed, monitor, .. } = self;
         let cost = |id: LegId| {
             let known = learnt.get(&id)?;
-            let verified = observed.get(&id).copied().unwrap_or(known.verified);
-            Some(Learnt::cost_of(known.mean_time_s, verified))
+            let tally = observed.get(&id).copied().unwrap_or(known.verified);
+            Some(Certificate { tally, mean_time_s: known.mean_time_s }.cost_s())
         };
         planner.plan(&cost, *monitor)
     }
@@ -315,7 +317,7 @@ impl Run<'_> {
 
     fn lesson<'b>(&'b self, leg: &'b Arc<Leg>, starts: Starts, seed: Seed) -> Lesson<'b> {
         let (workspace, noise, settings) = (self.workspace, &self.settings.noise, &self.settings.learn);
-        Lesson { workspace, leg, next: None, starts: Arc::new(starts), noise, settings, seed }
+        Lesson { workspace, leg, next: None, tail: &[], starts: Arc::new(starts), noise, settings, seed }
     }
 
     fn starts(&self, leg: &Leg, seed: Seed) -> Starts {
@@ -377,7 +379,10 @@ impl Run<'_> {
         let leg_wanted = 1.0 - (1.0 - wanted) / legs.len() as f64;
         let is_weak = |tally: &Tally| tally.episodes >= 50 && tally.rate() < leg_wanted;
         let on_arrival = tallies(&runs, legs.len());
-        let weak: Vec<usize> = (0..legs.len()).filter(|&index| is_weak(&on_arrival[index])).collect();
+        // Who arrives badly is as much to blame as who cannot cope with it.
+        let is_to_blame =
+            |index: usize| is_weak(&on_arrival[index]) || on_arrival.get(index + 1).is_some_and(is_weak);
+        let weak: Vec<usize> = (0..legs.len()).filter(|&index| is_to_blame(index)).collect();
         let relearn = |&index: &usize| self.relearn(legs, index, &runs, (leg_wanted, round));
         let results: Vec<_> = weak.par_iter().map(relearn).collect();
         let mut better = false;
@@ -408,16 +413,18 @@ impl Run<'_> {
         let mut settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
         if self.learnt[&leg.id].gradient_steps > 0 {
             // It was trained in vain or for nearly the same.
-            settings.train.max_env_steps = 0;
+            settings.train_below = 0.0;
         }
         let next = legs.get(index + 1);
-        let lesson = Lesson { settings: &settings, next, ..self.lesson(leg, starts, seed) };
+        let drivers = self.drivers(legs);
+        let tail = &drivers[index + 1..drivers.len().min(index + 1 + TAIL_LEGS)];
+        let lesson = Lesson { settings: &settings, next, tail, ..self.lesson(leg, starts, seed) };
         let old = &self.learnt[&leg.id];
-        let present = lesson.certify(&old.policy);
+        let present = lesson.judge(&old.policy);
         let mut new = lesson.learn(&|| self.monitor.should_stop()).ok()?;
         new.env_steps += old.env_steps;
         new.gradient_steps += old.gradient_steps;
-        let gained = new.verified.rate() - present.tally.rate();
+        let gained = lesson.judge(&new.policy).tally.rate() - present.tally.rate();
         (gained >= GAIN_MIN).then_some(new)
     }
 

@@ -46,7 +46,7 @@ mod world;
 pub use controller::{Aim, WaypointController};
 pub use description::SyntaxError;
 pub use kinematic::KinematicSim;
-pub use noise::{ActionNoise, EpisodeNoise, NoiseError, NoiseModel, SlipperyPatches};
+pub use noise::{ActionNoise, EpisodeNoise, NoiseError, NoiseModel, STEER_PER_DRIFT_S, SlipperyPatches};
 pub use planar::PlanarSim;
 #[cfg(feature = "rigid3d")]
 pub use rigid::RigidSim;

@@ -18,7 +18,7 @@ use crate::state::Command;
 const PATCH_M: f64 = 0.5;
 /// Steering error of a car that drifts by 1 rad/s at 1 m/s. On the Limo's wheelbase it has 1.5 times
 /// the effect that the name promises; the values of the nominal noise were tuned with it.
-const STEER_PER_DRIFT_S: f64 = 0.3;
+pub const STEER_PER_DRIFT_S: f64 = 0.3;
 /// A wheel that slips more does not drive at all.
 const SLIP_MAX: f64 = 0.95;
 

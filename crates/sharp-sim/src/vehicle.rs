@@ -80,15 +80,16 @@ pub struct ActionReport {
     pub path_m: f64,
 }
 
-/// Everything that changes in a [`Vehicle`]; restores it exactly where the simulator has no memory
-/// beyond the state ([`KinematicSim`](crate::KinematicSim), or no contact).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct VehicleSnapshot {
-    state: RobotState,
+/// Everything that changes in a [`Vehicle`], the simulator's contacts included: whoever restores it
+/// continues bit for bit.
+#[derive(Clone, Debug)]
+pub struct VehicleSnapshot<S> {
+    sim: S,
+    noise: EpisodeNoise,
     seed: Seed,
     episode: u64,
     action: u64,
-    delayed: Vec<Command>,
+    delayed: VecDeque<Command>,
 }
 
 impl<S: Simulator> Vehicle<S> {
@@ -189,21 +190,29 @@ impl<S: Simulator> Vehicle<S> {
     }
 
     /// Everything that changes.
-    pub fn snapshot(&self) -> VehicleSnapshot {
+    pub fn snapshot(&self) -> VehicleSnapshot<S>
+    where
+        S: Clone,
+    {
         VehicleSnapshot {
-            state: *self.state(),
+            sim: self.sim.clone(),
+            noise: self.noise.clone(),
             seed: self.seed,
             episode: self.episode,
             action: self.action,
-            delayed: self.delayed.iter().copied().collect(),
+            delayed: self.delayed.clone(),
         }
     }
 
-    /// Continues from `snapshot`, which was taken from a vehicle with the same robot and noise.
-    pub fn restore(&mut self, snapshot: &VehicleSnapshot) {
-        self.reset(snapshot.state, snapshot.seed, snapshot.episode);
-        self.action = snapshot.action;
-        self.delayed = snapshot.delayed.iter().copied().collect();
+    /// Continues from `snapshot`, which was taken from a vehicle of the same robot in the same world.
+    pub fn restore(&mut self, snapshot: &VehicleSnapshot<S>)
+    where
+        S: Clone,
+    {
+        self.sim = snapshot.sim.clone();
+        self.noise = snapshot.noise.clone();
+        (self.seed, self.episode, self.action) = (snapshot.seed, snapshot.episode, snapshot.action);
+        self.delayed.clone_from(&snapshot.delayed);
     }
 
     fn begin_action(&mut self) -> ActionNoise {

@@ -468,29 +468,21 @@ fn one_thread_and_two_give_equal_bits() {
 }
 
 #[test]
-fn the_engine_continues_from_a_snapshot_but_for_rounding() {
-    // The engine holds headings as (cos, sin) in single precision, a snapshot as an angle.
-    for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let mut original = vehicle(SimulatorKind::Planar, &plain(), robot, NoiseModel::biased());
-        original.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)), Seed(5), 3);
-        episode(&mut original, 11);
-        let mut restored = original.clone();
-        restored.restore(&original.snapshot());
-        let (ours, theirs) = (episode(&mut restored, 20), episode(&mut original, 20));
-        let apart_m = ours.iter().zip(&theirs).map(|(a, b)| a.pose.distance_m(&b.pose)).fold(0.0, f64::max);
-        assert!(apart_m < 1e-4, "{}: {apart_m} m apart within 10 s", original.robot().name);
-    }
-}
-
-#[test]
-fn a_snapshot_survives_a_file() {
-    for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let mut original = noisy(SimulatorKind::Kinematic, robot.clone());
-        episode(&mut original, 11);
-        let text = ron::to_string(&original.snapshot()).expect("a snapshot is plain data");
-        let mut restored = noisy(SimulatorKind::Kinematic, robot.clone());
-        restored.restore(&ron::from_str(&text).expect("it was just written"));
-        assert_eq!(episode(&mut restored, 30), episode(&mut original, 30), "{}", robot.name);
+fn a_snapshot_is_restored_bit_for_bit() {
+    for kind in KINDS {
+        for robot in [RobotModel::husky(), RobotModel::limo()] {
+            let mut vehicle = noisy(kind, robot.clone());
+            for taken in [3, 11, 40] {
+                // Taken while it moves and while it touches walls; restored after another episode.
+                episode(&mut vehicle, taken);
+                let snapshot = vehicle.snapshot();
+                let expected = episode(&mut vehicle, 30);
+                vehicle.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)), Seed(9), 4);
+                episode(&mut vehicle, 7);
+                vehicle.restore(&snapshot);
+                assert_eq!(episode(&mut vehicle, 30), expected, "{} {kind} after {taken}", robot.name);
+            }
+        }
     }
 }
 

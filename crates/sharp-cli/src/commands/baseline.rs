@@ -148,7 +148,7 @@ impl Bench<'_> {
             return self.learn(length_s.unwrap_or(HORIZON_S).max(60.0), stopwatch, stop).map(Some);
         }
         let Some(route) = route else { return Ok(None) };
-        let robot = &workspace.robot;
+        let (robot, noise) = (&workspace.robot, self.settings.noise.clone());
         Ok(Some(if args.method == Method::Track {
             self.drive(
                 &Track {
@@ -156,15 +156,16 @@ impl Bench<'_> {
                     planner: &planner,
                     query: *query,
                     route,
-                    settings: TrackSettings::new(robot),
+                    settings: TrackSettings::new(robot, &noise),
+                    noise,
                 },
                 stopwatch,
                 stop,
             )
         } else {
-            let settings = MppiSettings::new(robot);
+            let settings = MppiSettings::new(robot, &noise);
             self.drive(
-                &Mppi { workspace, planner: &planner, query: *query, route, settings, seed: *seed },
+                &Mppi { workspace, planner: &planner, query: *query, route, settings, noise, seed: *seed },
                 stopwatch,
                 stop,
             )

@@ -5,11 +5,16 @@
 //! time limit: three times what its own first path takes at half the robot's top speed, and at least
 //! a minute. [`Rrt`] and [`Sac`] are the paper's; [`Track`] and [`Mppi`] are what an engineer would use.
 
+mod model;
 mod mppi;
+mod observer;
 mod route;
 mod rrt;
 mod sac;
 mod track;
+
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 

@@ -9,18 +9,17 @@
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
-use sharp_sim::{ActionSettings, Command, Drive, RobotModel, RobotState, WaypointController};
-use sharp_space::{CollisionChecker, Heading, Pose, Seed, Stream, Vector};
+use sharp_sim::{ActionSettings, NoiseModel, RobotModel, RobotState};
+use sharp_space::{CollisionChecker, Pose, Seed, Stream};
 
+use crate::baseline::model::{MODEL_DT_S, Model};
+use crate::baseline::observer::{Observer, Trim};
 use crate::baseline::route::{OnRoute, RoutePlanner};
 use crate::baseline::track::TrackSettings;
 use crate::baseline::{Baseline, Pilot, Readiness, Situation};
 use crate::percept::{Tracker, Workspace};
 use crate::planner::Query;
 use crate::policy::PolarWaypoint;
-
-/// Time step of the model, seconds: two control periods.
-const MODEL_DT_S: f64 = 0.1;
 
 /// Sampling and cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,9 +49,9 @@ pub struct MppiSettings {
 impl MppiSettings {
     /// What did best on generated maps (see `docs/algorithms/baselines.md`).
     #[must_use]
-    pub fn new(robot: &RobotModel) -> Self {
+    pub fn new(robot: &RobotModel, noise: &NoiseModel) -> Self {
         Self {
-            samples: 256,
+            samples: 96,
             horizon: 8,
             bearing_sd_rad: 0.25,
             speed_sd: 0.2,
@@ -61,7 +60,7 @@ impl MppiSettings {
             room_weight: 4.0,
             cross_weight: 2.0,
             contact_cost: 100.0,
-            base: TrackSettings::new(robot),
+            base: TrackSettings::new(robot, noise),
         }
     }
 }
@@ -79,18 +78,22 @@ pub struct Mppi<'a> {
     pub route: GuidePath,
     /// Sampling and cost.
     pub settings: MppiSettings,
+    /// The noise that the robot expects.
+    pub noise: NoiseModel,
     /// Root of the perturbations.
     pub seed: Seed,
 }
 
 impl Baseline for Mppi<'_> {
     fn pilot(&self, episode: u64) -> Box<dyn Pilot + '_> {
-        let Self { workspace, planner, query, route, settings, seed } = self;
+        let Self { workspace, planner, query, route, settings, noise, seed } = self;
+        let model = Model::new(&workspace.robot);
         Box::new(MppiPilot {
             workspace,
             settings,
             on_route: OnRoute::new(planner, *query, route.clone(), settings.base.speed),
-            model: Model::new(&workspace.robot),
+            observer: Observer::new(model.clone(), noise),
+            model,
             // The last disc ends at the nose, so a corner is a half width ahead of and beside its centre.
             corner_m: (std::f64::consts::SQRT_2 - 1.0) * workspace.robot.footprint.half_width_m(),
             mean: vec![Push::default(); settings.horizon],
@@ -124,6 +127,7 @@ struct MppiPilot<'a> {
     settings: &'a MppiSettings,
     on_route: OnRoute<'a>,
     model: Model,
+    observer: Observer,
     /// How far the outline's corners stick out of the discs beside which room is measured, metres.
     corner_m: f64,
     /// The sequence that the next decision begins with.
@@ -134,6 +138,7 @@ struct MppiPilot<'a> {
 
 impl Pilot for MppiPilot<'_> {
     fn prepare(&mut self, situation: &Situation) -> Readiness {
+        self.observer.end(&situation.state, situation.bumped);
         let readiness = self.on_route.prepare(situation);
         if readiness != Readiness::Ready {
             self.mean.fill(Push::default());
@@ -145,12 +150,14 @@ impl Pilot for MppiPilot<'_> {
         let mut rng = self.seed.stream("decision", self.decisions);
         self.decisions += 1;
         let samples = self.samples(&mut rng);
-        let costs: Vec<f64> =
-            samples.chunks(self.settings.horizon).map(|pushes| self.cost(state, pushes)).collect();
-        self.mean = weighted_mean(&samples, &costs, self.settings);
         let (robot, on_route) = (&self.workspace.robot, &self.on_route);
         let base = self.settings.base.waypoint(robot, &state.pose, &on_route.tracker, on_route);
-        let command = self.mean[0].applied(robot, base);
+        let trim = self.observer.trim(base, self.settings.base.trim);
+        let costs: Vec<f64> =
+            samples.chunks(self.settings.horizon).map(|pushes| self.cost(state, pushes, &trim)).collect();
+        self.mean = weighted_mean(&samples, &costs, self.settings);
+        let command = self.mean[0].applied(robot, trim.applied(base));
+        self.observer.begin(state, command);
         self.mean.rotate_left(1);
         *self.mean.last_mut().expect("a sequence has actions") = Push::default();
         command
@@ -175,16 +182,16 @@ impl MppiPilot<'_> {
     }
 
     /// The cost of `pushes` from `state`: seconds of the way that is left undone, and what it risked.
-    fn cost(&self, state: &RobotState, pushes: &[Push]) -> f64 {
+    fn cost(&self, state: &RobotState, pushes: &[Push], trim: &Trim) -> f64 {
         let Self { workspace, settings, on_route, .. } = self;
-        let robot = &workspace.robot;
+        let (robot, traits) = (&workspace.robot, self.observer.traits());
         let action_s = ActionSettings::default().action_s;
         let (mut state, mut tracker) = (*state, on_route.tracker);
         let (begun_m, mut cost) = (tracker.arc_m, 0.0);
         for (number, push) in pushes.iter().enumerate() {
             let base = settings.base.waypoint(robot, &state.pose, &tracker, on_route);
-            let command = push.applied(robot, base);
-            if !self.model.act(&mut state, command, |at| self.is_free(at, &mut cost)) {
+            let command = push.applied(robot, trim.applied(base));
+            if !self.model.act(&mut state, command, traits, |at| self.is_free(at, &mut cost)) {
                 // The later, the less certain.
                 return cost + settings.contact_cost / (1.0 + number as f64);
             }
@@ -241,63 +248,4 @@ fn weighted_mean(samples: &[Push], costs: &[f64], settings: &MppiSettings) -> Ve
         }
     }
     mean
-}
-
-/// A body that goes where its wheels roll, as fast as motors allow; no noise, no friction, no walls.
-#[derive(Clone, Debug)]
-struct Model {
-    robot: RobotModel,
-    controller: WaypointController,
-}
-
-impl Model {
-    fn new(robot: &RobotModel) -> Self {
-        let controller = WaypointController::new(robot, ActionSettings::default().action_s);
-        Self { robot: robot.clone(), controller }
-    }
-
-    /// Moves `state` by one action; false as soon as `is_free` denies a state on the way.
-    fn act(
-        &self,
-        state: &mut RobotState,
-        waypoint: PolarWaypoint,
-        mut is_free: impl FnMut(&RobotState) -> bool,
-    ) -> bool {
-        let aim = self.controller.aim(&state.pose, waypoint.to_world(&state.pose), waypoint.speed_mps);
-        let steps = (ActionSettings::default().action_s / MODEL_DT_S).round() as usize;
-        (0..steps).all(|_| {
-            let command = self.controller.command(state, &aim);
-            self.follow(state, command);
-            is_free(state)
-        })
-    }
-
-    fn follow(&self, state: &mut RobotState, command: Command) {
-        let robot = &self.robot;
-        let (Command::Twist { speed_mps, .. } | Command::Steer { speed_mps, .. }) = command;
-        state.wheel_speed_mps = approach(state.wheel_speed_mps, speed_mps, robot.max_accel_mps2 * MODEL_DT_S);
-        let (turn_rad, slip_rad) = match (robot.drive, command) {
-            (Drive::Ackermann { steer_rate_radps, wheelbase_m, .. }, Command::Steer { steer_rad, .. }) => {
-                state.steer_rad = approach(state.steer_rad, steer_rad, steer_rate_radps * MODEL_DT_S);
-                let tan = state.steer_rad.tan();
-                (state.wheel_speed_mps * tan / wheelbase_m * MODEL_DT_S, (0.5 * tan).atan())
-            }
-            (_, Command::Twist { yaw_rate_radps, .. }) => {
-                let step = robot.max_yaw_accel_radps2 * MODEL_DT_S;
-                let wanted_radps = yaw_rate_radps * robot.yaw_gain();
-                state.yaw_rate_radps = approach(state.yaw_rate_radps, wanted_radps, step);
-                (state.yaw_rate_radps * MODEL_DT_S, 0.0)
-            }
-            (Drive::Differential { .. }, Command::Steer { .. }) => (0.0, 0.0),
-        };
-        let heading = state.pose.heading.radians();
-        let way =
-            Heading::new(heading + slip_rad + 0.5 * turn_rad).unit() * (state.wheel_speed_mps * MODEL_DT_S);
-        state.pose = Pose::at(state.pose.position + way, Heading::new(heading + turn_rad));
-        state.velocity = Vector::new(state.wheel_speed_mps, 0.0);
-    }
-}
-
-fn approach(value: f64, target: f64, step: f64) -> f64 {
-    value + (target - value).clamp(-step, step)
 }

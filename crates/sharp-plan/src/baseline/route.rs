@@ -5,7 +5,7 @@
 
 use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, plan_guide};
 use sharp_motion::{Budget, HybridSettings, Path, RrtSettings, Steering, hybrid_astar};
-use sharp_sim::{ActionSettings, RobotState};
+use sharp_sim::RobotState;
 use sharp_space::{CollisionChecker, Footprint, FootprintChecker, Heading, Point, Pose, Seed};
 
 use crate::baseline::track::SpeedRule;
@@ -22,13 +22,10 @@ const STILL_M: f64 = 0.15;
 const STILL_TURN_RAD: f64 = 0.3;
 /// What is tried in turn: metres added to the outline on each side, and the turning radius in units of
 /// the robot's own. A car that slips cannot follow its tightest bend.
-const SPARES: [(f64, f64); 5] = [(0.10, 1.5), (0.06, 1.5), (0.06, 1.25), (0.03, 1.25), (0.0, 1.0)];
+const SPARES: [(f64, f64); 7] =
+    [(0.10, 2.5), (0.10, 2.0), (0.10, 1.5), (0.06, 1.5), (0.06, 1.25), (0.03, 1.25), (0.0, 1.0)];
 /// Actions between two plans: what a new path needs to show its worth.
 const PATIENCE_ACTIONS: u32 = 6;
-/// Share of the sway that is kept from one action to the next.
-const SWAY_KEPT: f64 = 0.9;
-/// A larger distance from the route is a manoeuvre, not a pull, metres.
-const SWAY_MAX_M: f64 = 0.15;
 
 /// Plans routes for one robot in one map.
 #[derive(Clone, Debug)]
@@ -48,8 +45,12 @@ impl<'a> RoutePlanner<'a> {
     /// A planner for the robot and the map of `workspace`.
     #[must_use]
     pub fn new(workspace: &'a Workspace) -> Self {
+        let mut spares = SPARES.to_vec();
+        if workspace.robot.can_turn_in_place() {
+            spares.dedup_by_key(|spare| spare.0);
+        }
         let attempts =
-            SPARES.iter().map(|&(margin_m, bend)| Attempt::new(workspace, margin_m, bend)).collect();
+            spares.iter().map(|&(margin_m, bend)| Attempt::new(workspace, margin_m, bend)).collect();
         Self { workspace, attempts }
     }
 
@@ -126,9 +127,6 @@ pub(crate) struct OnRoute<'a> {
     /// How freely the robot may drive along the route.
     pub(crate) ease: Vec<f64>,
     pub(crate) tracker: Tracker,
-    /// Recent distance from the route, added up over time, metre seconds, left positive: what a pull
-    /// to one side costs that the follower alone does not cure.
-    pub(crate) sway_ms: f64,
     /// Where the robot last moved, and the actions since.
     anchor: (Pose, u32),
     /// Actions since the last plan; `None` before the first decision.
@@ -144,17 +142,7 @@ impl<'a> OnRoute<'a> {
     ) -> Self {
         let tracker = Tracker::start(&route, &query.start);
         let ease = speed.ease(planner.workspace, &route);
-        Self {
-            planner,
-            query,
-            route,
-            speed,
-            ease,
-            tracker,
-            sway_ms: 0.0,
-            anchor: (query.start, 0),
-            actions: None,
-        }
+        Self { planner, query, route, speed, ease, tracker, anchor: (query.start, 0), actions: None }
     }
 
     /// Projects the robot onto its route; a new one is planned from where it is if it has left it.
@@ -165,9 +153,6 @@ impl<'a> OnRoute<'a> {
             return self.planned();
         };
         self.tracker.update(&self.route, &state.pose);
-        let action_s = ActionSettings::default().action_s;
-        self.sway_ms =
-            SWAY_KEPT * self.sway_ms + self.tracker.cross_track_m.clamp(-SWAY_MAX_M, SWAY_MAX_M) * action_s;
         self.watch(state);
         self.actions = Some(actions + 1);
         let is_off = self.tracker.cross_track_m.abs() > OFF_ROUTE_M
@@ -182,7 +167,7 @@ impl<'a> OnRoute<'a> {
                 self.ease = self.speed.ease(self.planner.workspace, &route);
                 self.route = route;
                 self.tracker = Tracker::start(&self.route, &state.pose);
-                (self.anchor, self.actions, self.sway_ms) = ((state.pose, 0), Some(0), 0.0);
+                (self.anchor, self.actions) = ((state.pose, 0), Some(0));
                 self.planned()
             }
             // The old route may yet lead on, and the robot may come to stand better.

@@ -5,9 +5,11 @@
 
 use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
-use sharp_sim::{RobotModel, RobotState};
+use sharp_sim::{NoiseModel, RobotModel, RobotState};
 use sharp_space::{Heading, Pose};
 
+use crate::baseline::model::Model;
+use crate::baseline::observer::Observer;
 use crate::baseline::route::{OnRoute, RoutePlanner};
 use crate::baseline::{Baseline, Pilot, Readiness, Situation};
 use crate::percept::{Tracker, Workspace};
@@ -73,22 +75,42 @@ pub struct TrackSettings {
     pub rule: Rule,
     /// How fast.
     pub speed: SpeedRule,
-    /// Turn of the direction against a sway, radians per metre second.
-    pub sway_gain: f64,
+    /// Share of the pull, as it is known so far, that the direction makes up for.
+    pub trim: f64,
 }
 
 impl TrackSettings {
-    /// What did best on generated maps (see `docs/algorithms/baselines.md`).
+    /// What did best on generated maps under noise like `noise` (see `docs/algorithms/baselines.md`).
     #[must_use]
-    pub fn new(robot: &RobotModel) -> Self {
-        if robot.can_turn_in_place() {
-            let (room_m, turn_rad, heading_rad, ahead_m) = ([0.15, 0.6], 2.0, 0.5, 1.5);
-            let speed = SpeedRule { cruise: 0.8, slow: 0.15, room_m, turn_rad, heading_rad, ahead_m };
-            Self { rule: Rule::Pursuit { look_ahead_m: 0.3 }, speed, sway_gain: 0.0 }
-        } else {
-            let (room_m, turn_rad, heading_rad, ahead_m) = ([0.1, 0.6], 1.6, 1.0, 0.75);
-            let speed = SpeedRule { cruise: 0.8, slow: 0.3, room_m, turn_rad, heading_rad, ahead_m };
-            Self { rule: Rule::Field { look_ahead_m: 0.4, softness_m: 0.3 }, speed, sway_gain: 0.4 }
+    pub fn new(robot: &RobotModel, noise: &NoiseModel) -> Self {
+        let is_harsh = noise.slip_max > 0.4 || noise.gain_sd > 0.25 || noise.waypoint_sd_m > 0.075;
+        let is_biased = noise.drift_bias_radps > 0.0 || noise.delay_s > 0.0;
+        match (robot.can_turn_in_place(), is_harsh, is_biased) {
+            (true, true, _) => {
+                let (room_m, turn_rad, heading_rad, ahead_m) = ([0.15, 0.95], 1.2, 0.3, 0.75);
+                let speed = SpeedRule { cruise: 0.8, slow: 0.1, room_m, turn_rad, heading_rad, ahead_m };
+                Self { rule: Rule::Field { look_ahead_m: 0.15, softness_m: 0.2 }, speed, trim: 0.3 }
+            }
+            (true, false, _) => {
+                let (room_m, turn_rad, heading_rad, ahead_m) = ([0.15, 0.6], 2.0, 0.5, 1.5);
+                let speed = SpeedRule { cruise: 0.8, slow: 0.15, room_m, turn_rad, heading_rad, ahead_m };
+                Self { rule: Rule::Pursuit { look_ahead_m: 0.3 }, speed, trim: 0.5 }
+            }
+            (false, true, _) => {
+                let (room_m, turn_rad, heading_rad, ahead_m) = ([0.1, 1.3], 0.8, 1.0, 0.75);
+                let speed = SpeedRule { cruise: 0.5, slow: 0.2, room_m, turn_rad, heading_rad, ahead_m };
+                Self { rule: Rule::Field { look_ahead_m: 0.4, softness_m: 0.3 }, speed, trim: 0.7 }
+            }
+            (false, false, true) => {
+                let (room_m, turn_rad, heading_rad, ahead_m) = ([0.1, 0.4], 0.8, 2.0, 0.75);
+                let speed = SpeedRule { cruise: 0.5, slow: 0.25, room_m, turn_rad, heading_rad, ahead_m };
+                Self { rule: Rule::Field { look_ahead_m: 0.4, softness_m: 0.3 }, speed, trim: 0.5 }
+            }
+            (false, false, false) => {
+                let (room_m, turn_rad, heading_rad, ahead_m) = ([0.1, 0.6], 2.0, 2.0, 0.75);
+                let speed = SpeedRule { cruise: 0.7, slow: 0.2, room_m, turn_rad, heading_rad, ahead_m };
+                Self { rule: Rule::Field { look_ahead_m: 0.4, softness_m: 0.4 }, speed, trim: 1.0 }
+            }
         }
     }
 
@@ -104,8 +126,7 @@ impl TrackSettings {
         let ease = on.ease[place.min(on.ease.len() - 1)];
         let speed_mps = self.speed.speed(ease, tracker.tangent, pose.heading) * robot.max_speed_mps;
         let view = GuideView { guide: &on.route, next: None };
-        let wanted = Follower { rule: self.rule, speed_mps }.waypoint(robot, pose, tracker, &view);
-        PolarWaypoint { bearing_rad: wanted.bearing_rad - self.sway_gain * on.sway_ms, ..wanted }
+        Follower { rule: self.rule, speed_mps }.waypoint(robot, pose, tracker, &view)
     }
 }
 
@@ -122,12 +143,15 @@ pub struct Track<'a> {
     pub route: GuidePath,
     /// How it is tracked.
     pub settings: TrackSettings,
+    /// The noise that the robot expects.
+    pub noise: NoiseModel,
 }
 
 impl Baseline for Track<'_> {
     fn pilot(&self, _episode: u64) -> Box<dyn Pilot + '_> {
         let on_route = OnRoute::new(self.planner, self.query, self.route.clone(), self.settings.speed);
-        Box::new(TrackPilot { baseline: self, on_route })
+        let observer = Observer::new(Model::new(&self.workspace.robot), &self.noise);
+        Box::new(TrackPilot { baseline: self, on_route, observer })
     }
 }
 
@@ -135,15 +159,20 @@ impl Baseline for Track<'_> {
 struct TrackPilot<'a> {
     baseline: &'a Track<'a>,
     on_route: OnRoute<'a>,
+    observer: Observer,
 }
 
 impl Pilot for TrackPilot<'_> {
     fn prepare(&mut self, situation: &Situation) -> Readiness {
+        self.observer.end(&situation.state, situation.bumped);
         self.on_route.prepare(situation)
     }
 
     fn decide(&mut self, state: &RobotState) -> PolarWaypoint {
-        let robot = &self.baseline.workspace.robot;
-        self.baseline.settings.waypoint(robot, &state.pose, &self.on_route.tracker, &self.on_route)
+        let (robot, settings) = (&self.baseline.workspace.robot, &self.baseline.settings);
+        let wanted = settings.waypoint(robot, &state.pose, &self.on_route.tracker, &self.on_route);
+        let command = self.observer.trim(wanted, settings.trim).applied(wanted);
+        self.observer.begin(state, command);
+        command
     }
 }
