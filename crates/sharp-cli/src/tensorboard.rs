@@ -1,4 +1,4 @@
-//! Event files that `TensorBoard` reads: numbers and pictures by step.
+//! Event files that TensorBoard reads: numbers and pictures by step.
 //!
 //! A file is a row of records (length, checksum, payload, checksum), each payload an `Event` in the
 //! encoding of protocol buffers. Both formats are simple enough to write out here.
