@@ -36,6 +36,7 @@ mod labels;
 mod loss;
 mod predict;
 mod score;
+mod settings;
 mod shipped;
 mod skeleton;
 mod store;
@@ -52,9 +53,7 @@ pub use heatmap::{HEADING_BINS, Heatmap};
 pub use labels::{LabelRobot, LabelSettings, Labels, label_map};
 pub use predict::{Prediction, RegionPredictor, RegionSettings, Source, geometric_regions, predict_regions};
 pub use score::{RegionScore, grid_regions, random_regions, score_regions, scoring_maps};
+pub use settings::{HELD_OUT_KINDS, TrainSettings, VALIDATION_KINDS};
 pub use store::{ModelCard, ModelError};
-pub use train::{
-    HELD_OUT_KINDS, TrainError, TrainFolder, TrainObserver, TrainProgress, TrainSettings, VALIDATION_KINDS,
-    train_regions,
-};
+pub use train::{TrainError, TrainFolder, TrainObserver, TrainProgress, train_regions};
 pub use unet::{Activation, UNetConfig};
