@@ -4,4 +4,5 @@ mod learning;
 mod library;
 mod maps;
 mod paper;
+mod regions;
 mod worlds;

@@ -10,6 +10,7 @@ mod bench;
 mod ci;
 mod eval;
 mod peers;
+mod peers_regions;
 mod process;
 mod stats;
 mod tidy;
@@ -34,7 +35,8 @@ usage: cargo xtask COMMAND
   baselines [--noise N,..] [--methods M,..] [--envs E,..] [--episodes N] [--out DIR]
                          sharp baseline on every problem, as tables; goes on where it was
   bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
-  bench peers [sim]      the same work here and in other programs, as JSON lines
+  bench peers [sim|regions]
+                         the same work here and in other programs, as JSON lines
                          [--rounds N] [--seconds S] [--map M]";
 
 fn main() -> ExitCode {

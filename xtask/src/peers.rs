@@ -12,6 +12,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, bail, ensure};
 use serde_json::{Value, json};
 
+use crate::peers_regions;
 use crate::process::{cargo, flag};
 use crate::tree::root;
 
@@ -35,7 +36,11 @@ const QUANTITIES: [&str; 4] = ["steps", "actions", "idle", "push"];
 /// Returns an error if the suite or a flag is unknown, or if a side cannot be built or run.
 pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     let suite = args.first().map_or("sim", String::as_str);
-    ensure!(suite == "sim" || suite.starts_with('-'), "no comparison is called {suite:?}, there is sim");
+    if suite == "regions" {
+        return peers_regions::run(&args[1..]);
+    }
+    let is_known = suite == "sim" || suite.starts_with('-');
+    ensure!(is_known, "no comparison is called {suite:?}, there are sim, regions");
     let rounds: usize = flag(args, "--rounds").unwrap_or("3").parse().context("--rounds")?;
     ensure!(rounds > 0, "--rounds is 0, must be at least 1");
     let seconds: f64 = flag(args, "--seconds").unwrap_or("3").parse().context("--seconds")?;
@@ -134,7 +139,7 @@ fn line(what: &str, quantity: &str, ours: &[Value], peers: &[Value]) -> anyhow::
 }
 
 /// The middle value; of an even number the lower one.
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len().checked_sub(1)? / 2).copied()
 }
@@ -158,7 +163,7 @@ fn executable(messages: &str) -> Option<PathBuf> {
     programs.next()
 }
 
-fn parse(text: &str) -> anyhow::Result<Value> {
+pub(crate) fn parse(text: &str) -> anyhow::Result<Value> {
     serde_json::from_str(text).with_context(|| format!("{text:?} is no JSON"))
 }
 
@@ -180,7 +185,7 @@ fn python() -> anyhow::Result<PathBuf> {
 }
 
 /// Runs `command`; stdout is ours alone, so what it says there goes nowhere.
-fn succeed(command: &mut Command) -> anyhow::Result<()> {
+pub(crate) fn succeed(command: &mut Command) -> anyhow::Result<()> {
     let program = command.get_program().to_owned();
     let status = command.stdout(Stdio::null()).status();
     let status = status.with_context(|| format!("cannot start {}", program.display()))?;
@@ -189,7 +194,7 @@ fn succeed(command: &mut Command) -> anyhow::Result<()> {
 }
 
 /// How busy the machine is: the mean number of running processes over the last minute.
-fn load() -> String {
+pub(crate) fn load() -> String {
     let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     text.split(' ').next().filter(|word| !word.is_empty()).unwrap_or("unknown").to_owned()
 }
@@ -230,7 +235,7 @@ mod tests {
     #[test]
     fn unknown_suites_and_maps_are_refused_before_anything_is_built() {
         for (args, expected) in [
-            (vec!["cooking"], "no comparison is called \"cooking\", there is sim"),
+            (vec!["cooking"], "no comparison is called \"cooking\", there are sim, regions"),
             (vec!["sim", "--map", "moon"], "no map is called \"moon\", there are grid_15, grid_75"),
             (vec!["--rounds", "0"], "--rounds is 0, must be at least 1"),
         ] {

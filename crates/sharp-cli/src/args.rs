@@ -99,8 +99,9 @@ pub(crate) struct AbstractionArgs {
     /// The kind of option.
     #[arg(long, value_enum, default_value_t = Kind::Interface)]
     pub(crate) options: Kind,
-    /// Where critical regions come from: net, geometric, or a file of region centres (.ron, a list of [x, y]).
-    #[arg(long, default_value = "net", value_name = "net|geometric|FILE")]
+    /// Where critical regions come from: net, geometric, or a file of region centres (.ron, a list of [x, y]);
+    /// for comparison also random and grid, as many discs as the network finds regions.
+    #[arg(long, default_value = "net", value_name = "net|geometric|random|grid|FILE")]
     pub(crate) regions: String,
     /// Distances of the diagram: geodesic, or the paper's Euclidean rule.
     #[arg(long, value_enum, default_value_t = Metric::Geodesic)]
@@ -211,7 +212,8 @@ pub(crate) enum Regions {
     Train(RegionsTrain),
     /// Draw the heat map of one map and list its regions.
     Predict(Abstract),
-    /// Score network, geometric detector and random regions on held-out maps.
+    /// Score network, geometric detector, random regions and a grid on held-out maps, or one of them at
+    /// the doors of a map.
     Score(RegionsScore),
 }
 
@@ -226,9 +228,25 @@ pub(crate) struct RegionsTrain {
     /// Size of the run.
     #[arg(long, default_value = "default", value_name = "tiny|default|paper")]
     pub(crate) preset: String,
-    /// Where the checkpoint is written.
+    /// Training maps, instead of the preset's number.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) maps: Option<u32>,
+    /// Goals on each map, instead of the preset's number.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) goals: Option<u32>,
+    /// Starts for each goal, instead of the preset's number.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) starts: Option<u32>,
+    /// Gradient steps, instead of the preset's number.
+    #[arg(long)]
+    pub(crate) steps: Option<u32>,
+    /// Where the network is written; labels, checkpoint, sample pictures and TensorBoard events go to a
+    /// folder beside it that ends in .work.
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
+    /// Go on from the checkpoint beside FILE.
+    #[arg(long)]
+    pub(crate) resume: bool,
 }
 
 #[derive(Debug, Args)]
@@ -236,9 +254,30 @@ pub(crate) struct RegionsScore {
     /// husky, limo or a robot file (.ron).
     #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
     pub(crate) robot: String,
+    /// A map to score at its doors, instead of generated ones.
+    #[arg(requires = "doors")]
+    pub(crate) map: Option<String>,
+    /// The doors of MAP: a YAML list with name and corners of each.
+    #[arg(long, value_name = "FILE", requires = "map")]
+    pub(crate) doors: Option<PathBuf>,
     /// Held-out maps of each kind.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) maps: u32,
+    /// Goals on each held-out map, instead of training's number.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) goals: Option<u32>,
+    /// Starts for each goal, instead of training's number.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) starts: Option<u32>,
+    /// What is scored at the doors: net, geometric, random, grid or a file.
+    #[arg(long, default_value = "net", value_name = "net|geometric|random|grid|FILE")]
+    pub(crate) regions: String,
+    /// A network to score instead of the shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+    /// Score extraction thresholds on the validation maps and name the best, instead of scoring.
+    #[arg(long, conflicts_with = "map")]
+    pub(crate) calibrate: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -405,6 +444,9 @@ pub(crate) struct Eval {
     /// Only this kind of option.
     #[arg(long, value_enum)]
     pub(crate) options: Option<Kind>,
+    /// Where critical regions come from.
+    #[arg(long, default_value = "net", value_name = "net|geometric|random|grid")]
+    pub(crate) regions: String,
     /// Only these problems of each map: numbers from 1, separated by commas.
     #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
     pub(crate) problems: Vec<usize>,

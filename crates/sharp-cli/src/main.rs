@@ -15,6 +15,7 @@ mod pipeline;
 mod progress;
 mod render;
 mod report;
+mod tensorboard;
 
 use std::process::ExitCode;
 

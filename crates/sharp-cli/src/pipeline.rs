@@ -5,9 +5,12 @@ use std::path::{Path, PathBuf};
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_plan::{AbstractionFile, FORMAT, OptionLibrary, Workspace, hash, map_hash};
 use sharp_rbvd::{CellMetric, Rbvd, RbvdSettings};
-use sharp_regions::{Heatmap, RegionPredictor, RegionSettings, Source, geometric_regions, predict_regions};
+use sharp_regions::{
+    Heatmap, RegionPredictor, RegionSettings, Source, geometric_regions, grid_regions, predict_regions,
+    random_regions,
+};
 use sharp_sim::{NoiseModel, RobotModel};
-use sharp_space::{Cell, Region, RegionId};
+use sharp_space::{Cell, Region, RegionId, Seed};
 
 use crate::args::{AbstractionArgs, Kind, Learning, Metric};
 use crate::input::read_text;
@@ -65,7 +68,7 @@ pub(crate) fn abstraction(
 
 fn cache_name(args: &AbstractionArgs) -> String {
     let regions = match args.regions.as_str() {
-        name @ ("net" | "geometric") => name.to_owned(),
+        name @ ("net" | "geometric" | "random" | "grid") => name.to_owned(),
         file => hash(std::fs::read(file).unwrap_or_default().as_slice())[..8].to_owned(),
     };
     format!("abstraction-{:?}-{:?}-{regions}.ron", args.options, args.metric).to_lowercase()
@@ -81,6 +84,7 @@ pub(crate) fn regions(
     let prediction = match choice {
         "net" => predict_regions(grid, footprint, &shipped(&workspace.robot), &settings),
         "geometric" => geometric_regions(grid, footprint, &settings.geometric),
+        "random" | "grid" => return Ok(blind_regions(workspace, choice)),
         file => {
             let regions = regions_from_file(workspace, file)?;
             return Ok((None, regions, file.to_owned()));
@@ -93,6 +97,25 @@ pub(crate) fn regions(
     Ok((Some(prediction.heatmap), prediction.regions, source.to_owned()))
 }
 
+/// Radius of the regions that know nothing of the map, metres.
+pub(crate) const BLIND_RADIUS_M: f64 = 0.5;
+
+/// As many discs as the network finds regions, at random or on a lattice: what a predictor must beat.
+fn blind_regions(workspace: &Workspace, choice: &str) -> (Option<Heatmap>, Vec<Region>, String) {
+    let footprint = &workspace.robot.footprint;
+    let predictor = shipped(&workspace.robot);
+    let wanted = predict_regions(&workspace.grid, footprint, &predictor, &RegionSettings::default()).regions;
+    let (field, least_m) = (workspace.checker.field(), footprint.inscribed_radius_m());
+    let regions = if choice == "grid" {
+        grid_regions(field, least_m, wanted.len(), BLIND_RADIUS_M)
+    } else {
+        let mut rng = Seed(1).stream("random regions", 0);
+        random_regions(field, least_m, wanted.len(), BLIND_RADIUS_M, &mut rng)
+    };
+    let heatmap = Heatmap::from_regions(*workspace.grid.frame(), &regions);
+    (Some(heatmap), regions, choice.to_owned())
+}
+
 /// The shipped network for `robot`, or the one trained for the footprint nearest in width.
 pub(crate) fn shipped(robot: &RobotModel) -> RegionPredictor {
     RegionPredictor::shipped_for(&robot.footprint)
@@ -101,7 +124,7 @@ pub(crate) fn shipped(robot: &RobotModel) -> RegionPredictor {
 /// A region of one cell's neighbourhood around each centre listed in a file.
 fn regions_from_file(workspace: &Workspace, file: &str) -> Result<Vec<Region>, Failure> {
     let broken = |problem: String| Failure::new("REGIONS_INVALID", format!("{file}: {problem}"));
-    let text = read_text(file, "regions", "net, geometric or a file")?;
+    let text = read_text(file, "regions", "net, geometric, random, grid or a file")?;
     let centers: Vec<(f64, f64)> = ron::from_str(&text).map_err(|error| broken(error.to_string()))?;
     let frame = workspace.grid.frame();
     let field = workspace.checker.field();

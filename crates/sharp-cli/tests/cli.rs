@@ -215,3 +215,51 @@ fn serve_answers_every_line() {
     assert_eq!(replies[1]["schema"], "sharp.error/1");
     assert_eq!(replies[2]["status"], "running");
 }
+
+#[test]
+fn regions_are_scored_at_the_doors_of_a_map() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let door = "- name: d1\n  door_corner_pt_1: [6.1, 2.4]\n  door_corner_pt_2: [6.1, 3.8]\n";
+    fs::write(folder.path().join("doors.yaml"), door).unwrap();
+    fs::write(folder.path().join("bad.yaml"), "name: d1\n").unwrap();
+    let score = |doors, regions| {
+        let args = ["--json", "regions", "score", "rooms.yaml", "--doors", doors, "--regions", regions];
+        sharp(folder.path(), &args)
+    };
+    for regions in ["net", "geometric"] {
+        let report = json(&score("doors.yaml", regions));
+        assert_eq!(report["schema"], "sharp.regions.score/1", "{report}");
+        assert_eq!((&report["doors"], &report["found"]), (&1.into(), &1.into()), "{regions}: {report}");
+        assert_eq!(report["door_recall"], 1.0, "{regions}: {report}");
+    }
+    let refused = score("bad.yaml", "net");
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+    let message = json(&refused)["error"]["message"].to_string();
+    assert!(message.contains("bad.yaml: is no list of doors"), "{message}");
+}
+
+#[test]
+fn regions_training_is_stopped_by_nothing_but_broken_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let train = |extra: &[&str]| {
+        let small = ["--maps", "2", "--goals", "2", "--starts", "3", "--steps", "3"];
+        let args = ["--json", "regions", "train", "--preset", "tiny", "--out", "net.safetensors"];
+        sharp(folder.path(), &[&args[..], &small, extra].concat())
+    };
+    let report = json(&train(&[]));
+    assert_eq!((&report["maps"], &report["steps"]), (&2.into(), &3.into()), "{report}");
+    let network = fs::read(folder.path().join("net.safetensors")).unwrap();
+    let work = folder.path().join("net.work");
+    assert!(work.join("samples/step-000003.png").exists(), "a sample picture");
+    assert_eq!(fs::read_dir(work.join("events")).unwrap().count(), 1, "one event file");
+
+    json(&train(&["--resume"]));
+    assert_eq!(fs::read(folder.path().join("net.safetensors")).unwrap(), network, "nothing was left to do");
+
+    fs::write(work.join("checkpoint.safetensors"), b"rubble").unwrap();
+    let refused = train(&["--resume"]);
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+    let message = json(&refused)["error"]["message"].to_string();
+    assert!(message.contains("checkpoint.safetensors is damaged"), "{message}");
+}

@@ -15,6 +15,7 @@
 //! assert_eq!(map.problems.len(), 5);
 //! ```
 
+mod doors;
 mod error;
 mod files;
 mod floor_plan;
@@ -30,6 +31,7 @@ mod drivable;
 #[cfg(test)]
 mod statistics;
 
+pub use doors::{Door, load_doors};
 pub use error::MapError;
 pub use load::{LoadOptions, MapFile, Problem, load};
 pub use named::named_maps;

@@ -94,13 +94,24 @@ impl Recipe {
 
     /// The sample from `folder` if it is there and sound, else a new one, which is then stored.
     pub(crate) fn load_or_make(&self, robot: &LabelRobot, folder: &Path) -> Result<Sample, DatasetError> {
-        let path = folder.join(format!("map-{:04}.safetensors", self.number));
+        let path = folder.join(self.file_name());
         if let Some(sample) = std::fs::read(&path).ok().and_then(|bytes| self.read(&bytes)) {
             return Ok(sample);
         }
         let sample = self.make(robot);
         write_whole(&path, &self.to_bytes(&sample))?;
         Ok(sample)
+    }
+
+    /// The line of the manifest about `sample`.
+    pub(crate) fn entry(&self, sample: &Sample) -> Entry {
+        let file = self.file_name();
+        let hash = blake3::hash(&self.to_bytes(sample)).to_hex().to_string();
+        Entry { file, kind: self.kind, solved: sample.labels.solved, blake3: hash }
+    }
+
+    fn file_name(&self) -> String {
+        format!("map-{:04}.safetensors", self.number)
     }
 
     fn to_bytes(&self, sample: &Sample) -> Vec<u8> {
@@ -156,6 +167,27 @@ impl Recipe {
         let side = (self.size_m / PIXEL_M).round() as usize;
         GridFrame { origin: Pose::new(0.0, 0.0, 0.0), resolution_m: PIXEL_M, width: side, height: side }
     }
+}
+
+/// What the manifest says of a map.
+#[derive(Debug, Serialize)]
+pub(crate) struct Entry {
+    file: String,
+    kind: FloorplanKind,
+    solved: usize,
+    blake3: String,
+}
+
+/// Lists the files of a dataset with their hashes, for whoever copies it.
+pub(crate) fn write_manifest(folder: &Path, maps: &[Entry]) -> Result<(), DatasetError> {
+    #[derive(Serialize)]
+    struct Manifest<'a> {
+        format: u32,
+        maps: &'a [Entry],
+    }
+    let json = serde_json::to_string_pretty(&Manifest { format: FORMAT, maps });
+    let json = json.expect("a manifest has no keys that are not text") + "\n";
+    write_whole(&folder.join("manifest.json"), json.as_bytes())
 }
 
 #[derive(Serialize, Deserialize)]

@@ -11,7 +11,7 @@ pub enum ComputeDevice {
     /// burn's own CPU backend.
     #[default]
     Flex,
-    /// The older CPU backend: the same results, but ten to twenty times slower in training.
+    /// The older CPU backend; `sharp_regions` computes convolutions for it as matrix products.
     #[cfg(feature = "ndarray")]
     Ndarray,
 }
@@ -25,4 +25,16 @@ impl ComputeDevice {
             Self::Ndarray => Device::ndarray(),
         }
     }
+}
+
+/// Returns true if the backend of `device` multiplies matrices much faster than it convolves.
+#[cfg(feature = "ndarray")]
+pub(crate) fn convolves_slowly(device: &Device) -> bool {
+    *device == ComputeDevice::Ndarray.device()
+}
+
+/// Returns true if the backend of `device` multiplies matrices much faster than it convolves.
+#[cfg(not(feature = "ndarray"))]
+pub(crate) const fn convolves_slowly(_: &Device) -> bool {
+    false
 }

@@ -16,6 +16,9 @@ use crate::heatmap::Heatmap;
 pub struct ExtractSettings {
     /// Least criticality of a cell, 0 to 1.
     pub threshold: f64,
+    /// Least criticality within a disc around a doorway that makes the doorway a region; above 1
+    /// none does.
+    pub doorway_threshold: f64,
     /// Least area of a region, square metres.
     pub area_min_m2: f64,
     /// Longest side of a region's bounding box, metres; longer pieces are split.
@@ -28,7 +31,14 @@ pub struct ExtractSettings {
 
 impl Default for ExtractSettings {
     fn default() -> Self {
-        Self { threshold: 0.4, area_min_m2: 0.15, extent_max_m: 2.5, disc_spacing_m: 2.5, disc_radius_m: 0.6 }
+        Self {
+            threshold: 0.5,
+            doorway_threshold: 0.15,
+            area_min_m2: 0.15,
+            extent_max_m: 2.5,
+            disc_spacing_m: 2.5,
+            disc_radius_m: 0.6,
+        }
     }
 }
 
@@ -44,7 +54,7 @@ const THRESHOLD_STEP: f64 = 0.04;
 /// # Panics
 /// If the heat map and the clearance belong to grids of different sizes.
 #[must_use]
-pub fn extract_regions(
+pub(crate) fn extract_regions(
     heatmap: &Heatmap,
     clearance: &DistanceField,
     min_clearance_m: f64,
@@ -57,8 +67,11 @@ pub fn extract_regions(
     let mut split = Split { heatmap, clearance, min_clearance_m, settings, mark: vec![false; frame.len()] };
     let mut pieces = Vec::new();
     split.above(&open, settings.threshold, &mut pieces);
-    let mut regions: Vec<Region> =
-        pieces.into_iter().filter_map(|cells| Region::new(RegionId(0), cells, clearance)).collect();
+    number(pieces.into_iter().filter_map(|cells| Region::new(RegionId(0), cells, clearance)).collect())
+}
+
+/// Numbers `regions` in row-major order of their representatives.
+pub(crate) fn number(mut regions: Vec<Region>) -> Vec<Region> {
     regions.sort_by_key(|region| region.representative);
     for (id, region) in regions.iter_mut().enumerate() {
         region.id = RegionId(id as u32);

@@ -59,11 +59,7 @@ pub fn detect_geometric(
     settings: &GeometricSettings,
 ) -> Vec<Region> {
     let reach = footprint.inscribed_radius_m();
-    let skeleton = Skeleton::new(clearance, reach, settings.widening);
-    let mut sites = junctions(&skeleton, clearance, settings);
-    for ridge in &skeleton.ridges {
-        sites.extend(narrowings(ridge, &skeleton, clearance, settings));
-    }
+    let sites = sites(clearance, footprint, settings);
     let mut cells = thin_sites(sites, clearance, settings.spacing_m);
     cells.sort_unstable();
     let mut taken = vec![false; clearance.frame().len()];
@@ -74,6 +70,38 @@ pub fn detect_geometric(
         .enumerate()
         .filter_map(|(id, cells)| Region::new(RegionId(id as u32), cells, clearance))
         .collect()
+}
+
+/// The cells of all doorways, junctions, bends and mouths of corridors, however close together.
+pub(crate) fn landmarks(
+    clearance: &DistanceField,
+    footprint: &Footprint,
+    settings: &GeometricSettings,
+) -> Vec<Cell> {
+    let sites = sites(clearance, footprint, settings).into_iter();
+    sites.filter(|site| site.kind != SiteKind::Stretch).map(|site| site.cell).collect()
+}
+
+/// The middles of short narrowings, the narrower first where two are closer than the spacing.
+pub(crate) fn doorways(
+    clearance: &DistanceField,
+    footprint: &Footprint,
+    settings: &GeometricSettings,
+) -> Vec<Cell> {
+    let sites = sites(clearance, footprint, settings).into_iter();
+    let doors = sites.filter(|site| site.kind == SiteKind::Doorway).collect();
+    let mut cells = thin_sites(doors, clearance, settings.spacing_m);
+    cells.sort_unstable();
+    cells
+}
+
+fn sites(clearance: &DistanceField, footprint: &Footprint, settings: &GeometricSettings) -> Vec<Site> {
+    let skeleton = Skeleton::new(clearance, footprint.inscribed_radius_m(), settings.widening);
+    let mut sites = junctions(&skeleton, clearance, settings);
+    for ridge in &skeleton.ridges {
+        sites.extend(narrowings(ridge, &skeleton, clearance, settings));
+    }
+    sites
 }
 
 /// Nodes in narrow places where at least two ridges meet.

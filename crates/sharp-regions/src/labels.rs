@@ -74,10 +74,10 @@ pub struct LabelSettings {
 
 impl Default for LabelSettings {
     fn default() -> Self {
-        // The paper solves 100 x 50 a map; a fifth gives nearly the same labels.
+        // The paper's numbers.
         Self {
-            goals: 40,
-            starts: 25,
+            goals: 100,
+            starts: 50,
             distance_min_m: 3.0,
             endpoint_radius_m: 1.0,
             smoothing_m: 0.2,

@@ -22,8 +22,12 @@
 //!
 //! `ndarray` adds burn's older CPU backend as a second [`ComputeDevice`].
 
+mod batch;
+mod conv;
 mod dataset;
 mod device;
+mod doors;
+mod doorways;
 mod extract;
 mod geometric;
 mod heatmap;
@@ -40,12 +44,17 @@ mod unet;
 
 pub use dataset::DatasetError;
 pub use device::ComputeDevice;
-pub use extract::{ExtractSettings, extract_regions};
+pub use doors::{DoorScore, score_doors};
+pub use doorways::find_regions;
+pub use extract::ExtractSettings;
 pub use geometric::{GeometricSettings, detect_geometric};
 pub use heatmap::{HEADING_BINS, Heatmap};
 pub use labels::{LabelRobot, LabelSettings, Labels, label_map};
 pub use predict::{Prediction, RegionPredictor, RegionSettings, Source, geometric_regions, predict_regions};
-pub use score::{RegionScore, random_regions, score_regions, scoring_maps};
+pub use score::{RegionScore, grid_regions, random_regions, score_regions, scoring_maps};
 pub use store::{ModelCard, ModelError};
-pub use train::{HELD_OUT_KINDS, TrainError, TrainProgress, TrainSettings, train_regions};
+pub use train::{
+    HELD_OUT_KINDS, TrainError, TrainFolder, TrainObserver, TrainProgress, TrainSettings, VALIDATION_KINDS,
+    train_regions,
+};
 pub use unet::{Activation, UNetConfig};

@@ -16,25 +16,16 @@ pub(crate) struct Targets {
     pub headed: Tensor<4>,
 }
 
-/// The weights of the parts of the loss.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LossWeights {
-    /// Weight of a critical pixel; one that is not has weight 1.
-    pub positive: f64,
-    /// Weight of the heading loss.
-    pub heading: f64,
-}
-
-/// The loss of `logits` `[batch, 11, rows, columns]`, one number.
+/// The losses of criticality and headings of `logits` `[batch, 11, rows, columns]`, one number each;
+/// a critical pixel weighs `positive_weight`, one that is not weighs 1.
 ///
 /// Unlike the published code the heading loss counts at critical pixels only; elsewhere its labels
 /// are zero and would teach the network the first class.
-pub(crate) fn loss(logits: Tensor<4>, targets: &Targets, weights: LossWeights) -> Tensor<1> {
-    let critical = criticality_loss(logits.clone().slice(s![.., 0..1, .., ..]), targets, weights.positive);
+pub(crate) fn losses(logits: Tensor<4>, targets: &Targets, positive_weight: f64) -> (Tensor<1>, Tensor<1>) {
+    let critical = criticality_loss(logits.clone().slice(s![.., 0..1, .., ..]), targets, positive_weight);
     let log_share = log_softmax(logits.slice(s![.., 1.., .., ..]), 1);
     let missed = (targets.headings.clone() * log_share).sum_dim(1).neg() * targets.headed.clone();
-    let headings = missed.sum() / targets.headed.clone().sum().clamp_min(1.0);
-    critical + headings * weights.heading
+    (critical, missed.sum() / targets.headed.clone().sum().clamp_min(1.0))
 }
 
 /// −w·y·ln σ(z) − (1 − y)·ln(1 − σ(z)), averaged over free pixels.
@@ -54,8 +45,8 @@ mod tests {
     use super::*;
     use crate::unet::OUTPUT_PLANES;
 
-    /// The loss of one pixel with the criticality logit `z` and heading logits that are all equal.
-    fn pixel(z: f32, y: f32, headed: f32) -> f32 {
+    /// The losses of one pixel with the criticality logit `z` and heading logits that are all equal.
+    fn pixel(z: f32, y: f32, headed: f32) -> (f32, f32) {
         let plane = |values: Vec<f32>| {
             let planes = values.len();
             Tensor::<4>::from_data(TensorData::new(values, [1, planes, 1, 1]), &Device::flex())
@@ -70,24 +61,26 @@ mod tests {
             headings: plane(headings),
             headed: plane(vec![headed]),
         };
-        loss(plane(logits), &targets, LossWeights { positive: 2.0, heading: 0.5 }).into_scalar::<f32>()
+        let (critical, heading) = losses(plane(logits), &targets, 2.0);
+        (critical.into_scalar::<f32>(), heading.into_scalar::<f32>())
     }
 
     #[test]
     fn the_loss_is_the_weighted_logarithm() {
         let sigma = |z: f32| 1.0 / (1.0 + (-z).exp());
         for z in [-3.0, 0.0, 1.5] {
-            assert!((pixel(z, 1.0, 0.0) + 2.0 * sigma(z).ln()).abs() < 1e-5, "critical, logit {z}");
-            assert!((pixel(z, 0.0, 0.0) + (1.0 - sigma(z)).ln()).abs() < 1e-5, "not critical, logit {z}");
+            assert!((pixel(z, 1.0, 0.0).0 + 2.0 * sigma(z).ln()).abs() < 1e-5, "critical, logit {z}");
+            assert!((pixel(z, 0.0, 0.0).0 + (1.0 - sigma(z)).ln()).abs() < 1e-5, "not critical, logit {z}");
         }
-        let headed = pixel(0.0, 0.0, 1.0) - pixel(0.0, 0.0, 0.0);
-        assert!((headed - 0.5 * 10.0_f32.ln()).abs() < 1e-5, "ten equal classes: {headed}");
+        let headed = pixel(0.0, 0.0, 1.0).1;
+        assert!((headed - 10.0_f32.ln()).abs() < 1e-5, "ten equal classes: {headed}");
+        assert_eq!(pixel(0.0, 0.0, 0.0).1, 0.0, "no heading counts where nothing is critical");
     }
 
     #[test]
     fn huge_logits_stay_finite() {
         for (z, y) in [(1e4, 0.0), (-1e4, 1.0), (1e4, 1.0)] {
-            assert!(pixel(z, y, 0.0).is_finite(), "logit {z}, label {y}");
+            assert!(pixel(z, y, 0.0).0.is_finite(), "logit {z}, label {y}");
         }
     }
 }

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use sharp_space::{Cell, DistanceField, Footprint, GridFrame, OccupancyGrid, Region, Vector};
 
 use crate::device::ComputeDevice;
-use crate::extract::{ExtractSettings, extract_regions};
+use crate::doorways::find_regions;
+use crate::extract::ExtractSettings;
 use crate::geometric::{GeometricSettings, detect_geometric};
 use crate::heatmap::{Heatmap, NO_HEADING};
 use crate::image::{Image, PIXEL_M, sample_plane};
@@ -95,7 +96,7 @@ pub fn predict_regions(
     let clearance = DistanceField::new(grid);
     let heatmap = predictor.heatmap(grid, &clearance);
     let min_clearance_m = footprint.inscribed_radius_m();
-    let regions = extract_regions(&heatmap, &clearance, min_clearance_m, &settings.extract);
+    let regions = find_regions(&heatmap, &clearance, footprint, settings);
     let reached = |regions: &[Region]| reached_share(regions, &clearance, min_clearance_m, settings.reach_m);
     let enough = reached(&regions) + settings.unreached_max;
     if enough < 1.0 {

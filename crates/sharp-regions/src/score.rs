@@ -105,6 +105,34 @@ pub fn random_regions(
     regions
 }
 
+/// Discs of `radius_m` on a square lattice laid so that about `count` of them lie in the robot's free
+/// space: regions that know nothing of the map.
+#[must_use]
+pub fn grid_regions(
+    clearance: &DistanceField,
+    min_clearance_m: f64,
+    count: usize,
+    radius_m: f64,
+) -> Vec<Region> {
+    let frame = clearance.frame();
+    let is_open = |cell: Cell| clearance.at(cell) >= min_clearance_m.max(f64::MIN_POSITIVE);
+    let open = (0..frame.len()).filter(|&i| is_open(frame.cell(i))).count();
+    // Closer than a radius the discs would swallow one another.
+    let least = radius_m / frame.resolution_m;
+    let spacing = (open as f64 / count.max(1) as f64).sqrt().max(least).max(1.0);
+    let line = |side: usize| {
+        (0..).map(move |i| ((f64::from(i) + 0.5) * spacing) as usize).take_while(move |&v| v < side)
+    };
+    let nodes = line(frame.height).flat_map(|row| line(frame.width).map(move |col| Cell::new(col, row)));
+    let mut taken = vec![false; frame.len()];
+    let mut regions = Vec::new();
+    for node in nodes.filter(|&node| count > 0 && is_open(node)) {
+        let cells = disc_around(node, clearance, min_clearance_m, radius_m, &mut taken);
+        regions.extend(Region::new(RegionId(regions.len() as u32), cells, clearance));
+    }
+    regions
+}
+
 /// Labelled maps of the given kinds that training with any seed does not see.
 #[must_use]
 pub fn scoring_maps(
@@ -149,6 +177,18 @@ mod tests {
         assert!((on.recall - 0.25).abs() < 1e-9, "a quarter of the band: {on:?}");
         assert!((on.mu - 0.5 / (40.0 * 0.125 * 0.125)).abs() < 1e-6, "share over area: {on:?}");
         assert!(on.density > 4.0 && beside.density < 1.0, "{on:?} {beside:?}");
+    }
+
+    #[test]
+    fn a_lattice_has_about_as_many_discs_as_asked_for() {
+        let frame = labels().frame;
+        let clearance = DistanceField::from_mask(frame, |i| i % 40 == 20);
+        for count in [0, 1, 9, 30] {
+            let found = grid_regions(&clearance, 0.2, count, 0.3).len();
+            assert!(found.abs_diff(count) <= count / 2 + 1, "{found} discs for {count}");
+        }
+        let blocked = DistanceField::from_mask(frame, |_| true);
+        assert_eq!(grid_regions(&blocked, 0.2, 9, 0.3), [], "no free space");
     }
 
     #[test]

@@ -126,8 +126,10 @@ fn trace_ridges(frame: &GridFrame, thin: &[bool], node_of: &[u32]) -> Vec<Ridge>
 /// Cells join in the order of falling clearance; where two hills meet, the lower one ends.
 fn peaks(frame: &GridFrame, heights: &[f32], inside: &[bool], ratio: f32) -> Vec<bool> {
     const NONE: u32 = u32::MAX;
-    let mut order: Vec<u32> = (0..frame.len() as u32).filter(|&i| inside[i as usize]).collect();
-    order.sort_by(|&a, &b| heights[b as usize].total_cmp(&heights[a as usize]).then(a.cmp(&b)));
+    let mut order = by_height(heights, inside);
+    // Highest first; equal heights keep the cells' order.
+    order.reverse();
+    order.chunk_by_mut(|&a, &b| heights[a as usize] == heights[b as usize]).for_each(<[u32]>::reverse);
     // Union-find over hills; a hill is named after its peak.
     let mut hill = vec![NONE; frame.len()];
     let mut is_peak = vec![false; frame.len()];
@@ -166,12 +168,45 @@ fn root(parent: &mut [u32], start: u32) -> u32 {
     index
 }
 
+/// The cells of `set` in the order of their heights, which must not be negative; equal heights in
+/// the cells' order.
+///
+/// Sorts by the bits of the numbers, half a word at a time: linear in the number of cells.
+fn by_height(heights: &[f32], set: &[bool]) -> Vec<u32> {
+    const DIGITS: usize = 1 << 16;
+    let mut order: Vec<u32> = (0..heights.len() as u32).filter(|&i| set[i as usize]).collect();
+    let mut sorted = vec![0; order.len()];
+    for shift in [0, 16] {
+        let digit = |index: u32| (heights[index as usize].to_bits() >> shift) as usize % DIGITS;
+        let mut next = vec![0_usize; DIGITS + 1];
+        order.iter().for_each(|&index| next[digit(index) + 1] += 1);
+        (0..DIGITS).for_each(|d| next[d + 1] += next[d]);
+        for &index in &order {
+            let place = &mut next[digit(index)];
+            sorted[*place] = index;
+            *place += 1;
+        }
+        std::mem::swap(&mut order, &mut sorted);
+    }
+    order
+}
+
 /// Removes cells from `thin`, least clearance first, as long as its topology stays.
+///
+/// The order of the first visits is known beforehand; only cells that must be looked at again wait
+/// in a heap, and they are few.
 fn thin_out(frame: &GridFrame, heights: &[f32], thin: &mut [bool], anchors: &[bool]) {
-    let key = |index: usize| Reverse((heights[index].to_bits(), index as u32));
-    let mut queued: Vec<bool> = thin.to_vec();
-    let mut queue: BinaryHeap<_> = (0..frame.len()).filter(|&i| thin[i] && !anchors[i]).map(key).collect();
-    while let Some(Reverse((_, index))) = queue.pop() {
+    let key = |index: usize| (heights[index].to_bits(), index as u32);
+    let mut queued: Vec<bool> = (0..frame.len()).map(|i| thin[i] && !anchors[i]).collect();
+    let mut first = by_height(heights, &queued).into_iter().map(|index| key(index as usize)).peekable();
+    let mut again: BinaryHeap<Reverse<(u32, u32)>> = BinaryHeap::new();
+    loop {
+        let next = match (first.peek(), again.peek()) {
+            (Some(a), Some(Reverse(b))) if b < a => again.pop().map(|Reverse(b)| b),
+            (None, _) => again.pop().map(|Reverse(b)| b),
+            _ => first.next(),
+        };
+        let Some((_, index)) = next else { return };
         let index = index as usize;
         queued[index] = false;
         if !is_simple(frame, thin, index) {
@@ -181,7 +216,7 @@ fn thin_out(frame: &GridFrame, heights: &[f32], thin: &mut [bool], anchors: &[bo
         for next in frame.neighbors8(frame.cell(index)).map(|c| frame.index(c)) {
             if thin[next] && !queued[next] && !anchors[next] {
                 queued[next] = true;
-                queue.push(key(next));
+                again.push(Reverse(key(next)));
             }
         }
     }

@@ -5,37 +5,37 @@
 //! run that is continued from its checkpoint ends with the network of a run that never stopped.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 
 use burn::module::Module;
 use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer, OptimizerRecord};
-use burn::tensor::{Bytes, Device, Tensor, TensorData};
-use rand::RngExt;
+use burn::tensor::{Bytes, Device};
 use serde::{Deserialize, Serialize};
+use sharp_space::Seed;
 use sharp_space::floorplan::FloorplanKind;
-use sharp_space::{Seed, Stream};
 use thiserror::Error;
 
-use crate::dataset::{DatasetError, Recipe, Sample, write_whole};
+use crate::batch::batch;
+use crate::dataset::{DatasetError, Recipe, Sample, write_manifest, write_whole};
 use crate::device::ComputeDevice;
-use crate::heatmap::HEADING_BINS;
-use crate::labels::{CRITICAL_MIN, FINE_BINS, LabelRobot, LabelSettings, source_bin, target};
-use crate::loss::{LossWeights, Targets, loss};
+use crate::labels::{LabelRobot, LabelSettings};
+use crate::loss::losses;
 use crate::predict::RegionPredictor;
 use crate::store::{ModelCard, ModelError, extra_bytes, from_bytes, to_bytes};
-use crate::unet::{INPUT_PLANES, UNet, UNetConfig};
+use crate::unet::{UNet, UNetConfig};
 
 /// Kinds of floor plans that training never sees: scores are measured on them.
-pub const HELD_OUT_KINDS: [FloorplanKind; 5] = [
-    FloorplanKind::Gaps,
-    FloorplanKind::CrossCorridors,
-    FloorplanKind::Islands,
-    FloorplanKind::RoomsAndClutter,
-    FloorplanKind::BentCorridor,
-];
+pub const HELD_OUT_KINDS: [FloorplanKind; 3] =
+    [FloorplanKind::CrossCorridors, FloorplanKind::Islands, FloorplanKind::BentCorridor];
+
+/// Kinds that neither training nor scores see: what is tuned is tuned on them.
+pub const VALIDATION_KINDS: [FloorplanKind; 2] = [FloorplanKind::Gaps, FloorplanKind::RoomsAndClutter];
 
 /// The name of the tensor with the optimiser's state in a checkpoint.
 const OPTIMIZER: &str = "optimizer";
+/// The name of the tensor with the settings of the run in a checkpoint, as JSON.
+const SETTINGS: &str = "settings";
 
 /// How a network is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,6 +69,7 @@ impl Default for TrainSettings {
     fn default() -> Self {
         Self {
             network: UNetConfig::compact(),
+            // Five of each kind that training sees; the paper has 20.
             maps: 85,
             labels: LabelSettings::default(),
             steps: 700,
@@ -84,14 +85,14 @@ impl Default for TrainSettings {
 }
 
 impl TrainSettings {
-    /// Too small to be of use, but done in seconds: for trying the machinery.
+    /// Done in seconds: better than chance, no more. For trying the machinery.
     #[must_use]
     pub fn tiny() -> Self {
         Self {
             network: UNetConfig { width: 8, levels: 2, ..UNetConfig::compact() },
-            maps: 4,
-            labels: LabelSettings { goals: 6, starts: 8, ..LabelSettings::default() },
-            steps: 40,
+            maps: 8,
+            labels: LabelSettings { goals: 8, starts: 10, ..LabelSettings::default() },
+            steps: 120,
             batch: 2,
             learning_rate: 1e-2,
             ..Self::default()
@@ -105,7 +106,6 @@ impl TrainSettings {
         Self {
             network: UNetConfig::paper(),
             maps: 20,
-            labels: LabelSettings { goals: 100, starts: 50, ..LabelSettings::default() },
             steps: 50_000,
             batch: 5,
             learning_rate: 1e-4,
@@ -114,10 +114,20 @@ impl TrainSettings {
     }
 }
 
+/// A folder with a training run's labels and checkpoint.
+#[derive(Clone, Copy, Debug)]
+pub struct TrainFolder<'a> {
+    /// Where it is; made if it is not there.
+    pub path: &'a Path,
+    /// Go on from the checkpoint in it instead of starting anew. Labels that are there are used
+    /// in any case.
+    pub resume: bool,
+}
+
 /// What training tells while it runs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
-pub enum TrainProgress {
+pub enum TrainProgress<'a> {
     /// A map has its labels.
     Labelled {
         /// Maps done.
@@ -133,8 +143,21 @@ pub enum TrainProgress {
         step: usize,
         /// Steps in all.
         of: usize,
-        /// The loss before it.
+        /// The loss before it: what is minimised.
         loss: f32,
+        /// Its part from the criticality.
+        critical_loss: f32,
+        /// Its part from the headings, before it is weighted.
+        heading_loss: f32,
+        /// The step size.
+        learning_rate: f64,
+    },
+    /// A checkpoint is due; it has been written if there is a folder.
+    Checkpoint {
+        /// Steps done.
+        step: usize,
+        /// The network as it is.
+        predictor: &'a RegionPredictor,
     },
 }
 
@@ -164,45 +187,76 @@ pub enum TrainError {
         /// The loss.
         loss: f32,
     },
+    /// The checkpoint cannot be gone on from.
+    #[error("checkpoint {path} {reason}; delete it to start over", path = path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The observer asked for it.
+    #[error("stopped after {step} steps, as asked")]
+    Stopped {
+        /// Steps done, 0 while maps were labelled.
+        step: usize,
+    },
 }
 
-/// Trains a network on the plans of `robot`; `observer` hears of every map and every step.
+/// Who hears of every map, step and checkpoint, and may break training off.
+pub type TrainObserver<'a> = dyn FnMut(&TrainProgress<'_>) -> ControlFlow<()> + 'a;
+
+/// Trains a network on the plans of `robot`; `observer` hears of every map, step and checkpoint.
 ///
-/// With a `folder`, labels and checkpoints are kept there, and a run that was stopped goes on where
-/// it was.
+/// With a `folder`, labels and checkpoints are kept there, and a run that was stopped can go on
+/// where it was. A run that the observer breaks off leaves a checkpoint.
 ///
 /// # Errors
-/// Returns an error if a setting is of no use, the folder cannot be written, or the loss diverges.
+/// Returns an error if a setting is of no use, the folder cannot be written, its checkpoint is
+/// damaged or of another run, the loss diverges, or the observer breaks off.
 pub fn train_regions(
     robot: &LabelRobot,
     settings: &TrainSettings,
-    folder: Option<&Path>,
-    observer: &mut dyn FnMut(&TrainProgress),
+    folder: Option<TrainFolder<'_>>,
+    observer: &mut TrainObserver<'_>,
 ) -> Result<RegionPredictor, TrainError> {
+    check(settings)?;
+    let samples = label_maps(robot, settings, folder.map(|folder| folder.path), observer)?;
+    let checkpoint = folder.map(|folder| folder.path.join("checkpoint.safetensors"));
+    let resumed = checkpoint.as_deref().filter(|path| folder.is_some_and(|f| f.resume) && path.exists());
+    let mut run = match resumed {
+        Some(path) => Run::resume(robot, settings, path)?,
+        None => Run::start(robot, settings),
+    };
+    while run.card.steps < settings.steps {
+        let progress = run.step(&samples, settings)?;
+        let step = run.card.steps;
+        let stop = observer(&progress).is_break();
+        let is_due = step.is_multiple_of(settings.checkpoint_steps) || step == settings.steps;
+        if let Some(path) = checkpoint.as_deref().filter(|_| is_due || stop) {
+            run.save(settings, path)?;
+        }
+        let stop = stop
+            || is_due
+                && observer(&TrainProgress::Checkpoint { step, predictor: &run.predictor(settings) })
+                    .is_break();
+        if stop && step < settings.steps {
+            return Err(TrainError::Stopped { step });
+        }
+    }
+    Ok(run.predictor(settings))
+}
+
+fn check(settings: &TrainSettings) -> Result<(), TrainError> {
     let counts =
         [("maps", settings.maps), ("batch", settings.batch), ("checkpoint_steps", settings.checkpoint_steps)];
-    for (field, value) in counts {
-        if value == 0 {
-            return Err(TrainError::Setting { field, value });
-        }
+    if let Some((field, value)) = counts.into_iter().find(|&(_, value)| value == 0) {
+        return Err(TrainError::Setting { field, value });
     }
     if !settings.network.is_sound() {
         return Err(ModelError::Network(settings.network).into());
     }
-    let samples = label_maps(robot, settings, folder, observer)?;
-    let checkpoint = folder.map(|folder| folder.join("checkpoint.safetensors"));
-    let mut run = Run::start_or_resume(robot, settings, checkpoint.as_deref());
-    while run.card.steps < settings.steps {
-        let loss = run.step(&samples, settings)?;
-        let done = run.card.steps;
-        observer(&TrainProgress::Step { step: done, of: settings.steps, loss });
-        if let Some(path) = &checkpoint
-            && (done.is_multiple_of(settings.checkpoint_steps) || done == settings.steps)
-        {
-            run.save(path)?;
-        }
-    }
-    Ok(RegionPredictor::new(run.network.valid(), run.card, settings.device))
+    Ok(())
 }
 
 /// Labels the training maps, or reads those that are already labelled.
@@ -210,20 +264,29 @@ fn label_maps(
     robot: &LabelRobot,
     settings: &TrainSettings,
     folder: Option<&Path>,
-    observer: &mut dyn FnMut(&TrainProgress),
+    observer: &mut TrainObserver<'_>,
 ) -> Result<Vec<Sample>, TrainError> {
-    let kinds: Vec<_> = FloorplanKind::ALL.into_iter().filter(|k| !HELD_OUT_KINDS.contains(k)).collect();
+    let is_kept = |kind: &FloorplanKind| HELD_OUT_KINDS.contains(kind) || VALIDATION_KINDS.contains(kind);
+    let kinds: Vec<_> = FloorplanKind::ALL.into_iter().filter(|kind| !is_kept(kind)).collect();
+    let maps = folder.map(|folder| folder.join("maps"));
     let mut samples = Vec::with_capacity(settings.maps);
+    let mut entries = Vec::with_capacity(settings.maps);
     for number in 0..settings.maps {
         let kind = kinds[number % kinds.len()];
         let recipe = Recipe::new(kind, number as u64, robot, settings.labels, settings.seed);
-        let sample = match folder {
-            Some(folder) => recipe.load_or_make(robot, &folder.join("maps"))?,
+        let sample = match &maps {
+            Some(folder) => recipe.load_or_make(robot, folder)?,
             None => recipe.make(robot),
         };
         let solved = sample.labels.solved;
-        observer(&TrainProgress::Labelled { map: number + 1, of: settings.maps, solved });
+        entries.push(recipe.entry(&sample));
         samples.push(sample);
+        if observer(&TrainProgress::Labelled { map: number + 1, of: settings.maps, solved }).is_break() {
+            return Err(TrainError::Stopped { step: 0 });
+        }
+    }
+    if let Some(folder) = &maps {
+        write_manifest(folder, &entries)?;
     }
     Ok(samples)
 }
@@ -237,8 +300,7 @@ struct Run {
 }
 
 impl Run {
-    /// Goes on from the checkpoint if there is a sound one of the same run, else starts.
-    fn start_or_resume(robot: &LabelRobot, settings: &TrainSettings, checkpoint: Option<&Path>) -> Self {
+    fn start(robot: &LabelRobot, settings: &TrainSettings) -> Self {
         let device = settings.device.device().autodiff();
         let card = ModelCard {
             format: ModelCard::format(),
@@ -250,49 +312,71 @@ impl Run {
             maps: settings.maps,
             seed: settings.seed,
         };
-        let stored = checkpoint.and_then(|path| Self::load(path, &device));
-        if let Some(run) = stored
-            && (ModelCard { steps: 0, ..run.card.clone() }) == card
-            && run.card.steps <= settings.steps
-        {
-            return run;
-        }
         let network = UNet::init(settings.network, &device, &mut settings.seed.stream("weights", 0));
         Self { network, optimizer: optimizer(), card, device }
     }
 
-    fn load(path: &Path, device: &Device) -> Option<Self> {
-        let bytes = std::fs::read(path).ok()?;
-        let (network, card) = from_bytes(&bytes, device).ok()?;
-        let state = Bytes::from_bytes_vec(extra_bytes(&bytes, OPTIMIZER).ok()?);
-        let optimizer = optimizer().load_record(OptimizerRecord::from_bytes(state).ok()?);
-        Some(Self { network, optimizer, card, device: device.clone() })
+    /// Goes on from the checkpoint at `path`.
+    fn resume(robot: &LabelRobot, settings: &TrainSettings, path: &Path) -> Result<Self, TrainError> {
+        let refused = |reason: String| TrainError::Checkpoint { path: path.to_owned(), reason };
+        let damaged = |error: &dyn std::fmt::Display| refused(format!("is damaged: {error}"));
+        let bytes = std::fs::read(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
+        let fresh = Self::start(robot, settings);
+        let (network, card) = from_bytes(&bytes, &fresh.device).map_err(|error| damaged(&error))?;
+        let stored = extra_bytes(&bytes, SETTINGS).map_err(|error| damaged(&error))?;
+        if (ModelCard { steps: 0, ..card.clone() }) != fresh.card || stored != as_json(settings) {
+            return Err(refused("is of a run with other settings".to_owned()));
+        }
+        let state = extra_bytes(&bytes, OPTIMIZER).map_err(|error| damaged(&error))?;
+        let record = OptimizerRecord::from_bytes(Bytes::from_bytes_vec(state));
+        let optimizer = optimizer().load_record(record.map_err(|error| damaged(&error))?);
+        Ok(Self { network, optimizer, card, device: fresh.device })
     }
 
-    fn save(&self, path: &Path) -> Result<(), TrainError> {
+    fn save(&self, settings: &TrainSettings, path: &Path) -> Result<(), TrainError> {
         let state = self.optimizer.into_bytes().expect("a CPU optimiser's state can be read");
-        let extra = BTreeMap::from([(OPTIMIZER.to_owned(), state.to_vec())]);
+        let extra = BTreeMap::from([
+            (OPTIMIZER.to_owned(), state.to_vec()),
+            (SETTINGS.to_owned(), as_json(settings)),
+        ]);
         Ok(write_whole(path, &to_bytes(&self.network, &self.card, &extra))?)
     }
 
-    /// One gradient step; returns the loss before it.
-    fn step(&mut self, samples: &[Sample], settings: &TrainSettings) -> Result<f32, TrainError> {
+    fn predictor(&self, settings: &TrainSettings) -> RegionPredictor {
+        RegionPredictor::new(self.network.valid(), self.card.clone(), settings.device)
+    }
+
+    /// One gradient step.
+    fn step(
+        &mut self,
+        samples: &[Sample],
+        settings: &TrainSettings,
+    ) -> Result<TrainProgress<'static>, TrainError> {
         let step = self.card.steps;
         let mut rng = settings.seed.stream("batch", step as u64);
         let base = settings.device.device();
         let (images, targets) = batch(samples, settings.batch, &base, &mut rng);
-        let weights = LossWeights { positive: settings.positive_weight, heading: settings.heading_weight };
-        let loss = loss(self.network.forward(images.to_device(&self.device)), &targets, weights);
+        let (critical, heading) =
+            losses(self.network.forward(images.to_device(&self.device)), &targets, settings.positive_weight);
+        let [critical_loss, heading_loss] = [&critical, &heading].map(|l| l.clone().into_scalar::<f32>());
+        let loss = critical + heading * settings.heading_weight;
         let value = loss.clone().into_scalar::<f32>();
         if !value.is_finite() {
             return Err(TrainError::Diverged { step, loss: value });
         }
         let gradients = GradientsParams::from_grads(loss.backward(), &self.network);
-        let rate = learning_rate(settings, step);
-        self.network = self.optimizer.step(rate, self.network.clone(), gradients);
+        let learning_rate = learning_rate(settings, step);
+        self.network = self.optimizer.step(learning_rate, self.network.clone(), gradients);
         self.card.steps += 1;
-        Ok(value)
+        let (step, of) = (self.card.steps, settings.steps);
+        Ok(TrainProgress::Step { step, of, loss: value, critical_loss, heading_loss, learning_rate })
     }
+}
+
+/// All that the run depends on; how often it is saved changes nothing.
+fn as_json(settings: &TrainSettings) -> Vec<u8> {
+    let settings = TrainSettings { checkpoint_steps: 1, ..settings.clone() };
+    serde_json::to_vec(&settings).expect("settings have no keys that are not text")
 }
 
 fn optimizer() -> ModuleOptimizer {
@@ -308,85 +392,15 @@ fn learning_rate(settings: &TrainSettings, step: usize) -> f64 {
     settings.learning_rate * ramp * 0.5 * (1.0 + (std::f64::consts::PI * share).cos())
 }
 
-/// `count` random samples, each in a random symmetry.
-fn batch(samples: &[Sample], count: usize, device: &Device, rng: &mut Stream) -> (Tensor<4>, Targets) {
-    let mut planes = Planes::default();
-    for _ in 0..count {
-        let sample = &samples[rng.random_range(0..samples.len())];
-        planes.add(sample, rng.random_range(0..8));
-    }
-    let frame = &samples[0].image.frame;
-    let tensor = |values: Vec<f32>, depth: usize| {
-        let shape = [count, depth, frame.height, frame.width];
-        Tensor::<4>::from_data(TensorData::new(values, shape), device)
-    };
-    let targets = Targets {
-        critical: tensor(planes.critical, 1),
-        free: tensor(planes.free, 1),
-        headings: tensor(planes.headings, HEADING_BINS),
-        headed: tensor(planes.headed, 1),
-    };
-    (tensor(planes.images, INPUT_PLANES), targets)
-}
-
-/// The values of a batch, sample after sample, plane after plane.
-#[derive(Default)]
-struct Planes {
-    images: Vec<f32>,
-    critical: Vec<f32>,
-    free: Vec<f32>,
-    headings: Vec<f32>,
-    headed: Vec<f32>,
-}
-
-impl Planes {
-    /// Adds `sample` turned by one of the eight symmetries of the square.
-    fn add(&mut self, sample: &Sample, symmetry: usize) {
-        let (image, labels) = (&sample.image, &sample.labels);
-        let side = image.frame.width;
-        assert_eq!(side, image.frame.height, "training maps are square");
-        let order: Vec<usize> = (0..side * side).map(|index| source_pixel(index, side, symmetry)).collect();
-        let criticality = labels.criticality();
-        self.images.extend(order.iter().map(|&i| image.blocked[i]));
-        self.images.extend(order.iter().map(|&i| image.clearance[i]));
-        self.critical.extend(order.iter().map(|&i| target(criticality[i])));
-        self.free.extend(order.iter().map(|&i| f32::from(u8::from(image.blocked[i] < 1.0))));
-        let bins = |pixel: usize| &labels.headings[pixel * FINE_BINS..(pixel + 1) * FINE_BINS];
-        let sums: Vec<f32> = order.iter().map(|&i| bins(i).iter().map(|&v| f32::from(v)).sum()).collect();
-        for class in 0..HEADING_BINS {
-            let halves = [2 * class, 2 * class + 1].map(|bin| source_bin(bin, symmetry));
-            let share = |(&i, sum): (&usize, &f32)| {
-                halves.iter().map(|&bin| f32::from(bins(i)[bin])).sum::<f32>() / sum.max(1.0)
-            };
-            self.headings.extend(order.iter().zip(&sums).map(share));
-        }
-        let headed = |(&i, &sum): (&usize, &f32)| criticality[i] >= CRITICAL_MIN && sum > 0.0;
-        self.headed.extend(order.iter().zip(&sums).map(|pair| f32::from(u8::from(headed(pair)))));
-    }
-}
-
-/// The pixel of the original that comes to `index` of the turned image.
-fn source_pixel(index: usize, side: usize, symmetry: usize) -> usize {
-    let (mut col, mut row) = (index % side, index / side);
-    if symmetry & 1 != 0 {
-        col = side - 1 - col;
-    }
-    if symmetry & 2 != 0 {
-        row = side - 1 - row;
-    }
-    if symmetry & 4 != 0 {
-        std::mem::swap(&mut col, &mut row);
-    }
-    row * side + col
-}
-
 #[cfg(test)]
 mod tests {
+    use rand::RngExt;
     use sharp_motion::Steering;
-    use sharp_space::Footprint;
+    use sharp_space::{DistanceField, Footprint};
 
     use super::*;
     use crate::unet::Activation;
+    use crate::{RegionScore, RegionSettings, find_regions, random_regions, score_regions, scoring_maps};
 
     fn robot() -> LabelRobot {
         let footprint = Footprint::rectangle(0.3, 0.2).unwrap();
@@ -406,43 +420,99 @@ mod tests {
         }
     }
 
+    /// Trains to the end, or until after step `stop`.
+    fn train(
+        settings: &TrainSettings,
+        folder: Option<TrainFolder<'_>>,
+        stop: Option<usize>,
+    ) -> (Result<RegionPredictor, TrainError>, Vec<f32>) {
+        let mut losses = Vec::new();
+        let mut observer = |progress: &TrainProgress<'_>| {
+            if let TrainProgress::Step { loss, step, .. } = progress {
+                losses.push(*loss);
+                if Some(*step) == stop {
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(())
+        };
+        let outcome = train_regions(&robot(), settings, folder, &mut observer);
+        (outcome, losses)
+    }
+
     #[test]
     fn a_few_seconds_of_training_reduce_the_loss() {
-        let mut losses = Vec::new();
-        let mut observer = |progress: &TrainProgress| {
-            if let TrainProgress::Step { loss, .. } = progress {
-                losses.push(*loss);
-            }
-        };
-        train_regions(&robot(), &settings(40), None, &mut observer).unwrap();
+        let losses = train(&settings(40), None, None).1;
         let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len() as f32;
         let (first, last) = (mean(&losses[..5]), mean(&losses[35..]));
         assert!(last < 0.75 * first, "from {first} to {last}");
     }
 
     #[test]
-    fn a_run_that_was_stopped_ends_like_one_that_was_not() {
+    fn the_tiny_preset_beats_random_regions_on_kinds_it_never_saw() {
+        let predictor = train(&TrainSettings::tiny(), None, None).0.unwrap();
+        let labels = LabelSettings { goals: 8, starts: 10, ..LabelSettings::default() };
+        let mut scores = [Vec::new(), Vec::new()];
+        for (index, (grid, labels)) in
+            scoring_maps(&HELD_OUT_KINDS, &robot(), labels, Seed(3)).iter().enumerate()
+        {
+            let clearance = DistanceField::new(grid);
+            let heatmap = predictor.heatmap(grid, &clearance);
+            let settings = RegionSettings::default();
+            let found = find_regions(&heatmap, &clearance, &robot().footprint, &settings);
+            let mut rng = Seed(3).stream("random", index as u64);
+            let random = random_regions(&clearance, 0.2, found.len(), 0.5, &mut rng);
+            scores[0].push(score_regions(&found, grid.frame(), labels));
+            scores[1].push(score_regions(&random, grid.frame(), labels));
+        }
+        let [found, random] = scores.map(|scores| RegionScore::mean(&scores));
+        assert!(found.density > 1.5 * random.density, "{found:?} against {random:?}");
+        assert!(found.precision > 2.0 * random.precision, "{found:?} against {random:?}");
+    }
+
+    #[test]
+    fn equal_seeds_give_equal_weights_stopped_anywhere_or_not() {
+        let whole = train(&settings(8), None, None).0.unwrap().to_bytes();
+        let other = TrainSettings { seed: Seed(2), ..settings(8) };
+        assert_ne!(train(&other, None, None).0.unwrap().to_bytes(), whole, "another seed");
+        let stop = Seed(77).stream("stop", 0).random_range(1..8);
         let folder = tempfile::tempdir().unwrap();
-        let train = |steps, folder: Option<&Path>| {
-            train_regions(&robot(), &settings(steps), folder, &mut |_| ()).unwrap()
-        };
-        // The step size depends on the total, so the stop is made by a panic in the observer.
-        let stopped = std::panic::catch_unwind(|| {
-            let mut stop = |progress: &TrainProgress| {
-                let stop_at = 6;
-                assert!(!matches!(progress, TrainProgress::Step { step, .. } if *step == stop_at), "stop");
-            };
-            train_regions(&robot(), &settings(8), Some(folder.path()), &mut stop).map(drop)
-        });
-        assert!(stopped.is_err(), "the run was to be stopped");
-        let resumed = train(8, Some(folder.path()));
-        assert_eq!(resumed.to_bytes(), train(8, None).to_bytes());
+        let at = |resume| Some(TrainFolder { path: folder.path(), resume });
+        let stopped = train(&settings(8), at(false), Some(stop)).0.unwrap_err();
+        assert_eq!(stopped.to_string(), format!("stopped after {stop} steps, as asked"));
+        let (resumed, losses) = train(&settings(8), at(true), None);
+        assert_eq!(losses.len(), 8 - stop, "steps after the stop");
+        assert_eq!(resumed.unwrap().to_bytes(), whole, "stopped after {stop} steps");
+        let manifest = std::fs::read_to_string(folder.path().join("maps/manifest.json")).unwrap();
+        assert!(manifest.contains("map-0001.safetensors"), "{manifest}");
+    }
+
+    #[test]
+    fn a_checkpoint_that_is_damaged_or_of_another_run_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |resume| Some(TrainFolder { path: folder.path(), resume });
+        train(&settings(4), at(false), None).0.unwrap();
+        let refusal = |settings: &TrainSettings| train(settings, at(true), None).0.unwrap_err().to_string();
+        let other = TrainSettings { learning_rate: 1e-3, ..settings(4) };
+        assert!(refusal(&other).contains("is of a run with other settings"), "{}", refusal(&other));
+        let path = folder.path().join("checkpoint.safetensors");
+        let bytes = std::fs::read(&path).unwrap();
+        for length in [0, 100, bytes.len() - 9] {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(refusal(&settings(4)).contains("is damaged"), "cut to {length}");
+        }
+        // A label file that is damaged is made again: its recipe is known.
+        let map = folder.path().join("maps/map-0000.safetensors");
+        let labels = std::fs::read(&map).unwrap();
+        std::fs::write(&map, b"no safetensors").unwrap();
+        train(&settings(4), at(false), None).0.unwrap();
+        assert_eq!(std::fs::read(&map).unwrap(), labels, "made again");
     }
 
     #[test]
     fn useless_settings_are_refused() {
         let refused = TrainSettings { batch: 0, ..settings(1) };
-        let error = train_regions(&robot(), &refused, None, &mut |_| ()).unwrap_err();
+        let error = train(&refused, None, None).0.unwrap_err();
         assert_eq!(error.to_string(), "training setting batch is 0, must be at least 1");
     }
 }

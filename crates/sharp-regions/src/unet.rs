@@ -8,13 +8,13 @@
 
 use burn::module::{Module, ModuleMapper, Param, ParamId};
 use burn::tensor::activation::{relu, tanh};
-use burn::tensor::module::{conv2d, max_pool2d};
-use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
-use burn::tensor::{Device, Tensor, TensorData};
-use rand_distr::{Distribution, Normal};
+use burn::tensor::module::max_pool2d;
+use burn::tensor::ops::MaxPoolOptions;
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use sharp_space::Stream;
 
+use crate::conv::Conv;
 use crate::heatmap::HEADING_BINS;
 
 /// Input planes: share of the pixel that is blocked, and clearance.
@@ -72,33 +72,6 @@ impl UNetConfig {
     /// Returns true if a network of this shape can be built.
     pub(crate) fn is_sound(&self) -> bool {
         (1..=512).contains(&self.width) && (1..=6).contains(&self.levels) && matches!(self.patch, 1 | 2)
-    }
-}
-
-/// A convolution with bias whose output is as large as its input.
-#[derive(Module, Debug)]
-pub(crate) struct Conv {
-    weight: Param<Tensor<4>>,
-    bias: Param<Tensor<1>>,
-}
-
-impl Conv {
-    /// Draws the weights from N(0, `gain` / fan-in); a kernel has `side` x `side` pixels.
-    fn init(ends: (usize, usize), side: usize, gain: f64, device: &Device, rng: &mut Stream) -> Self {
-        let (inputs, outputs) = ends;
-        let fan_in = inputs * side * side;
-        let normal = Normal::new(0.0, (gain / fan_in as f64).sqrt()).expect("the deviation is positive");
-        let values: Vec<f32> = (0..outputs * fan_in).map(|_| normal.sample(rng) as f32).collect();
-        Self {
-            weight: Param::from_data(TensorData::new(values, [outputs, inputs, side, side]), device),
-            bias: Param::from_data(TensorData::new(vec![0.0_f32; outputs], [outputs]), device),
-        }
-    }
-
-    fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let padding = self.weight.dims()[2] / 2;
-        let options = ConvOptions::new([1, 1], [padding, padding], [1, 1], 1);
-        conv2d(x, self.weight.val(), Some(self.bias.val()), options)
     }
 }
 
@@ -230,6 +203,7 @@ fn depth_to_space(x: Tensor<4>, patch: usize) -> Tensor<4> {
 
 #[cfg(test)]
 mod tests {
+    use burn::tensor::TensorData;
     use sharp_space::Seed;
 
     use super::*;

@@ -36,6 +36,11 @@ struct ResultLine {
     problem: usize,
     robot: String,
     options: String,
+    #[serde(default = "net")]
+    regions: String,
+    /// Options synthesised in the environment.
+    #[serde(default)]
+    options_available: usize,
     noise: String,
     trial: u32,
     seed: u64,
@@ -51,6 +56,11 @@ struct ResultLine {
     env_steps: u64,
     gradient_steps: u64,
     time_s: SolveTimes,
+}
+
+/// What results were made with before there was a choice.
+fn net() -> String {
+    "net".to_owned()
 }
 
 pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
@@ -141,6 +151,7 @@ fn is_result_of(line: &ResultLine, case: &Case, args: &Eval, seed: u64) -> bool 
         && line.problem == case.problem
         && line.robot == case.robot
         && line.options == sharp_plan::kind_name(case.kind.into())
+        && line.regions == args.regions
         && line.noise == args.noise
         && line.learning == learning_name(args.learning)
         && line.seed == seed
@@ -171,7 +182,11 @@ fn read_lines(path: &Path) -> Result<Vec<ResultLine>, Failure> {
 fn evaluate(case: &Case, args: &Eval, seed: u64) -> Result<Option<ResultLine>, Failure> {
     let kind = sharp_plan::kind_name(case.kind.into());
     // Problems of one environment, robot and kind share a library: P2 to P5 reuse what P1 learnt.
-    let group = format!("{}-{}-{kind}-{}-{seed}", case.env, case.robot, learning_name(args.learning));
+    let learning = learning_name(args.learning);
+    let mut group = format!("{}-{}-{kind}-{learning}-{seed}", case.env, case.robot);
+    if args.regions != net() {
+        group = format!("{group}-{}", args.regions);
+    }
     let folder = args.out.join("plans").join(format!("{group}-p{}", case.problem));
     let solve = solve_args(case, args, args.out.join("library").join(&group), folder.clone());
     let Solved { report, plan } = solve_problem(&solve, seed)?;
@@ -188,6 +203,8 @@ fn evaluate(case: &Case, args: &Eval, seed: u64) -> Result<Option<ResultLine>, F
         problem: case.problem,
         robot: case.robot.to_owned(),
         options: kind.to_owned(),
+        regions: args.regions.clone(),
+        options_available: report.options_available,
         noise: args.noise.clone(),
         trial: 0,
         seed,
@@ -212,7 +229,7 @@ fn solve_args(case: &Case, args: &Eval, library: PathBuf, out: PathBuf) -> Solve
     let abstraction = AbstractionArgs {
         robot: case.robot.to_owned(),
         options: case.kind,
-        regions: "net".to_owned(),
+        regions: args.regions.clone(),
         metric: Metric::Geodesic,
     };
     Solve {

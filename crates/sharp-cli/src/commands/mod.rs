@@ -7,6 +7,8 @@ pub(crate) mod library;
 pub(crate) mod map;
 pub(crate) mod prior;
 pub(crate) mod regions;
+mod regions_score;
+mod regions_train;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;
