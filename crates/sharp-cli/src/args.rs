@@ -297,7 +297,7 @@ pub(crate) struct PriorTrain {
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
     /// Number of generated maps.
-    #[arg(long, default_value_t = 90)]
+    #[arg(long, default_value_t = 180)]
     pub(crate) maps: u32,
     /// Environment steps [default: those of the shipped prior].
     #[arg(long, value_name = "N")]

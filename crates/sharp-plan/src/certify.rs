@@ -5,9 +5,9 @@ use sharp_sim::{NoiseModel, RobotState, Simulator, Vehicle};
 use sharp_space::Seed;
 
 use crate::learn::kinematic_vehicle;
-use crate::percept::Workspace;
+use crate::percept::{Percept, Workspace};
 use crate::policy::DecisionScratch;
-use crate::rollout::{ChainRun, Driver, drive_chain};
+use crate::rollout::{ChainRun, Driver, LegOutcome, drive_chain};
 use crate::starts::Starts;
 use crate::stats::Tally;
 
@@ -63,6 +63,20 @@ impl Trial<'_> {
                 (run.passed(drivers.len() - 1), run.times_s.iter().sum())
             });
         certificate(&ends)
+    }
+
+    /// Runs `driver` once from each of `states` and returns the states in which it arrived.
+    #[must_use]
+    pub fn exits(&self, driver: &Driver<'_>, states: &[RobotState]) -> Vec<RobotState> {
+        let trial = Trial { episodes: states.len() as u32, ..*self };
+        let horizon = driver.leg.horizon_actions(crate::SLOWEST_REACH_M);
+        let ends =
+            trial.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
+                let state = states[episode as usize];
+                vehicle.reset(state, self.seed.child("exit", 0), episode);
+                driver.drive(self.workspace, vehicle, Percept::first(state), horizon, scratch)
+            });
+        ends.iter().filter(|end| end.outcome == LegOutcome::Done).map(|end| end.percept.state).collect()
     }
 
     /// Runs the chain of `drivers` from `start`.

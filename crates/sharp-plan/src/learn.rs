@@ -219,9 +219,21 @@ impl Lesson<'_> {
     /// Says whether it was stopped or what broke. A policy that merely falls short is returned with
     /// its certificate: the planner decides what it is worth.
     pub fn learn(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+        self.learn_judged(stop).map(|(_, learnt)| learnt)
+    }
+
+    /// The same, with what [`judge`](Self::judge) says of it.
+    pub(crate) fn learn_judged(
+        &self,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(Certificate, Learnt), LearnFailure> {
         match self.settings.mode {
             LearningMode::Fast => self.learn_fast(stop),
-            LearningMode::Paper => self.learn_paper(stop),
+            LearningMode::Paper => {
+                let learnt = self.learn_paper(stop)?;
+                let judged = Certificate { tally: learnt.verified, mean_time_s: learnt.mean_time_s };
+                Ok((judged, learnt))
+            }
         }
     }
 
@@ -254,37 +266,38 @@ impl Lesson<'_> {
         trial.of_legs(&self.drivers(policy), &self.starts)
     }
 
-    fn learnt(&self, policy: OptionPolicy, effort: (u64, u64)) -> Learnt {
-        let certificate = self.certify(&policy);
+    /// `policy` with its certificate: what was judged, unless others had a part in that.
+    fn learnt(&self, policy: OptionPolicy, judged: Certificate, effort: (u64, u64)) -> Learnt {
+        let certificate = if self.tail.is_empty() { judged } else { self.certify(&policy) };
         learnt(policy, certificate, effort)
     }
 
-    /// The policy at hand that costs least and holds as wanted; where none does, the one that holds
-    /// most often, or what the prior learns on this leg.
-    fn learn_fast(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
-        let mut finalists: Vec<(Certificate, OptionPolicy)> = Vec::with_capacity(FINALISTS);
+    /// The cheapest policy at hand that holds as wanted; where none does, the one that holds most
+    /// often, or what the prior learns on this leg.
+    fn learn_fast(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<(Certificate, Learnt), LearnFailure> {
+        let mut best: Option<(Certificate, OptionPolicy)> = None;
         for policy in self.screen() {
             if stop() {
                 return Err(LearnFailure::Stopped);
             }
-            finalists.push((self.judge(&policy), policy));
+            let judged = self.judge(&policy);
+            if judged.tally.rate() >= self.settings.wanted_success {
+                return Ok((judged, self.learnt(policy, judged, (0, 0))));
+            }
+            if best.as_ref().is_none_or(|(best, _)| judged.tally.successes > best.tally.successes) {
+                best = Some((judged, policy));
+            }
         }
-        finalists.sort_by(|a, b| a.0.cost_s().total_cmp(&b.0.cost_s()));
-        let passes = |judged: &Certificate| judged.tally.rate() >= self.settings.wanted_success;
-        if let Some(index) = finalists.iter().position(|(judged, _)| passes(judged)) {
-            return Ok(self.learnt(finalists.swap_remove(index).1, (0, 0)));
-        }
-        // The first of equals: the one that costs least.
-        let best = finalists.into_iter().rev().max_by_key(|(judged, _)| judged.tally.successes);
         let (judged, policy) = best.expect("there are candidates");
         if judged.tally.rate() >= self.settings.train_below {
-            return Ok(self.learnt(policy, (0, 0)));
+            return Ok((judged, self.learnt(policy, judged, (0, 0))));
         }
         let trained = self.train_on(stop)?;
-        if self.judge(&trained.policy).tally.successes > judged.tally.successes {
-            return Ok(trained);
+        let anew = self.judge(&trained.policy);
+        if anew.tally.successes > judged.tally.successes {
+            return Ok((anew, trained));
         }
-        Ok(self.learnt(policy, (trained.env_steps, trained.gradient_steps)))
+        Ok((judged, self.learnt(policy, judged, (trained.env_steps, trained.gradient_steps))))
     }
 
     /// What drives without learning: the few that cost least, each round on more episodes than the one

@@ -19,10 +19,14 @@ use crate::rollout::{ChainRun, Driver, LegOutcome};
 use crate::starts::{StartSpread, Starts};
 use crate::stats::Tally;
 
+/// Runs that show how a leg arrives.
+const ARRIVALS: usize = 256;
 /// Start states kept of each leg.
 const START_POOL: usize = 256;
 /// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
+/// A leg that holds as often as this on arrival is not trained anew, only chosen anew.
+const TRAIN_BELOW: f64 = 0.97;
 /// Legs after a repaired one that judge how it arrives.
 const TAIL_LEGS: usize = 2;
 /// Gain below which a repaired policy counts as no better, share of episodes: luck explains less.
@@ -289,30 +293,62 @@ impl Run<'_> {
         for leg in legs {
             self.adopt(leg)?;
         }
-        let missing: Vec<&Arc<Leg>> = legs.iter().filter(|leg| !self.learnt.contains_key(&leg.id)).collect();
+        let is_missing = |leg: &&Arc<Leg>| !self.learnt.contains_key(&leg.id);
+        let missing: Vec<Arc<Leg>> = legs.iter().filter(is_missing).cloned().collect();
         self.monitor.phase(Phase::Learn(missing.len()));
-        let results: Vec<_> = missing
-            .par_iter()
-            .map(|&leg| {
-                let seed = self.settings.seed.child(&format!("leg {}", leg.id), 0);
-                let result =
-                    self.lesson(leg, self.starts(leg, seed), seed).learn(&|| self.monitor.should_stop());
-                if let Ok(learnt) = &result {
-                    self.monitor.learnt(leg, learnt);
+        match self.settings.learn.mode {
+            LearningMode::Fast if missing.is_empty() => Ok(true),
+            LearningMode::Fast => self.learn_in_order(legs),
+            LearningMode::Paper => self.learn_apart(&missing),
+        }
+    }
+
+    /// One leg after the other, each from where the one before it arrives and with the next in view.
+    fn learn_in_order(&mut self, legs: &[Arc<Leg>]) -> Result<bool, FileError> {
+        let mut arrivals = vec![RobotState::at_rest(self.query.start); ARRIVALS];
+        for (index, leg) in legs.iter().enumerate() {
+            let seed = self.settings.seed.child(&format!("leg {}", leg.id), 0);
+            if !self.learnt.contains_key(&leg.id) {
+                let starts = self.starts(leg, seed).with_arrivals(arrivals.clone());
+                let lesson = Lesson { next: legs.get(index + 1), ..self.lesson(leg, starts, seed) };
+                let result = lesson.learn(&|| self.monitor.should_stop());
+                if !self.take(leg, result)? {
+                    return Ok(false);
                 }
-                (Arc::clone(leg), result)
-            })
-            .collect();
-        let mut finished = true;
-        for (leg, result) in results {
-            match result {
-                Ok(learnt) => self.keep(&leg, learnt)?,
-                Err(LearnFailure::Stopped) => finished = false,
-                // A broken task cannot be learnt: its edge goes, the search goes on.
-                Err(LearnFailure::Broken(_)) => self.keep(&leg, useless())?,
             }
+            let (policy, next) = (&self.learnt[&leg.id].policy, legs.get(index + 1));
+            let driver = Driver { leg, policy, next: next.map(|next| &next.guide) };
+            let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes: 0, seed };
+            arrivals = trial.exits(&driver, &arrivals);
+        }
+        Ok(true)
+    }
+
+    /// Each leg on its own and all at once: the paper's way.
+    fn learn_apart(&mut self, missing: &[Arc<Leg>]) -> Result<bool, FileError> {
+        let learn = |leg: &Arc<Leg>| {
+            let seed = self.settings.seed.child(&format!("leg {}", leg.id), 0);
+            self.lesson(leg, self.starts(leg, seed), seed).learn(&|| self.monitor.should_stop())
+        };
+        let results: Vec<_> = missing.par_iter().map(learn).collect();
+        let mut finished = true;
+        for (leg, result) in missing.iter().zip(results) {
+            finished &= self.take(leg, result)?;
         }
         Ok(finished)
+    }
+
+    /// Keeps what was learnt of `leg`; false if learning was stopped.
+    fn take(&mut self, leg: &Leg, result: Result<Learnt, LearnFailure>) -> Result<bool, FileError> {
+        let learnt = match result {
+            Ok(learnt) => learnt,
+            Err(LearnFailure::Stopped) => return Ok(false),
+            // A broken task cannot be learnt: its edge goes, the search goes on.
+            Err(LearnFailure::Broken(_)) => useless(),
+        };
+        self.monitor.learnt(leg, &learnt);
+        self.keep(leg, learnt)?;
+        Ok(true)
     }
 
     fn lesson<'b>(&'b self, leg: &'b Arc<Leg>, starts: Starts, seed: Seed) -> Lesson<'b> {
@@ -411,8 +447,10 @@ impl Run<'_> {
         let seed = self.settings.seed.child(&format!("repair {}", leg.id), round);
         let starts = self.starts(leg, seed).with_arrivals(arrivals);
         let mut settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
-        if self.learnt[&leg.id].gradient_steps > 0 {
-            // It was trained in vain or for nearly the same.
+        // Training is for legs that are weak themselves, and once only.
+        let present =
+            Tally::count(runs.iter().filter(|run| run.entries.len() > index).map(|run| run.passed(index)));
+        if self.learnt[&leg.id].gradient_steps > 0 || present.rate() >= TRAIN_BELOW {
             settings.train_below = 0.0;
         }
         let next = legs.get(index + 1);
@@ -421,11 +459,10 @@ impl Run<'_> {
         let lesson = Lesson { settings: &settings, next, tail, ..self.lesson(leg, starts, seed) };
         let old = &self.learnt[&leg.id];
         let present = lesson.judge(&old.policy);
-        let mut new = lesson.learn(&|| self.monitor.should_stop()).ok()?;
+        let (judged, mut new) = lesson.learn_judged(&|| self.monitor.should_stop()).ok()?;
         new.env_steps += old.env_steps;
         new.gradient_steps += old.gradient_steps;
-        let gained = lesson.judge(&new.policy).tally.rate() - present.tally.rate();
-        (gained >= GAIN_MIN).then_some(new)
+        (judged.tally.rate() - present.tally.rate() >= GAIN_MIN).then_some(new)
     }
 
     fn solution(&self, legs: &[Arc<Leg>], runs: &[ChainRun], on_arrival: &[Tally]) -> Solution {

@@ -113,7 +113,7 @@ pub fn train_settings() -> TrainSettings {
             zero_last_actor_layer: true,
             ..SacSettings::fast()
         },
-        max_env_steps: 240_000,
+        max_env_steps: 600_000,
         evaluate_every: 20_000,
         evaluation_episodes: 800,
         stop: StopRule::Never,
