@@ -142,8 +142,9 @@ impl PacedFollower {
             Rule::Pursuit { look_ahead_m: 0.5 },
             Rule::Pursuit { look_ahead_m: 0.3 },
             Rule::Field { look_ahead_m: 0.4, softness_m: 0.4 },
+            Rule::Field { look_ahead_m: 0.15, softness_m: 0.2 },
         ];
-        let paces = [(1.0, 0.3), (0.8, 0.15)];
+        let paces = [(1.0, 0.3), (0.8, 0.15), (0.5, 0.1)];
         let top_mps = robot.max_speed_mps;
         let paced = |rule, (fast, slow): (f64, f64)| Self {
             follower: Follower { rule, speed_mps: fast * top_mps },
