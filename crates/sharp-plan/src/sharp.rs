@@ -1,36 +1,30 @@
 //! Algorithm 1: from an abstraction and a problem to a policy composed of options.
 
+mod learning;
+mod repair;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use rayon::prelude::*;
 use sharp_options::OptionKind;
 use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Seed;
 
 use crate::certify::{Certificate, Trial};
 use crate::files::FileError;
-use crate::learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson};
+use crate::learn::{LearnSettings, LearningMode, Learnt, Lesson};
 use crate::leg::{Leg, LegId, Role};
-use crate::library::{OptionLibrary, StoredOption};
+use crate::library::OptionLibrary;
 use crate::percept::Workspace;
 use crate::planner::{Abstraction, Planner, Query, SearchSettings, Unplaced};
 use crate::rollout::{ChainRun, Driver, LegOutcome};
 use crate::starts::{StartSpread, Starts};
 use crate::stats::Tally;
 
-/// Runs that show how a leg arrives.
-const ARRIVALS: usize = 256;
 /// Start states kept of each leg.
 const START_POOL: usize = 256;
 /// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
-/// A leg that holds as often as this on arrival is not trained anew, only chosen anew.
-const TRAIN_BELOW: f64 = 0.97;
-/// Legs after a repaired one that judge how it arrives.
-const TAIL_LEGS: usize = 2;
-/// Gain below which a repaired policy counts as no better, share of episodes: luck explains less.
-const GAIN_MIN: f64 = 0.003;
 /// Plans run from end to end before the best of them is taken.
 const VERIFIED_MAX: usize = 3;
 
@@ -288,69 +282,6 @@ impl Run<'_> {
         Ok(Some(self.solution(legs, &runs, &on_arrival)))
     }
 
-    /// Lines 11 to 19: learns what neither the library nor an earlier attempt has. Returns false if stopped.
-    fn learn_missing(&mut self, legs: &[Arc<Leg>]) -> Result<bool, FileError> {
-        for leg in legs {
-            self.adopt(leg)?;
-        }
-        let is_missing = |leg: &&Arc<Leg>| !self.learnt.contains_key(&leg.id);
-        let missing: Vec<Arc<Leg>> = legs.iter().filter(is_missing).cloned().collect();
-        self.monitor.phase(Phase::Learn(missing.len()));
-        match self.settings.learn.mode {
-            LearningMode::Fast if missing.is_empty() => Ok(true),
-            LearningMode::Fast => self.learn_in_order(legs),
-            LearningMode::Paper => self.learn_apart(&missing),
-        }
-    }
-
-    /// One leg after the other, each from where the one before it arrives and with the next in view.
-    fn learn_in_order(&mut self, legs: &[Arc<Leg>]) -> Result<bool, FileError> {
-        let mut arrivals = vec![RobotState::at_rest(self.query.start); ARRIVALS];
-        for (index, leg) in legs.iter().enumerate() {
-            let seed = self.settings.seed.child(&format!("leg {}", leg.id), 0);
-            if !self.learnt.contains_key(&leg.id) {
-                let starts = self.starts(leg, seed).with_arrivals(arrivals.clone());
-                let lesson = Lesson { next: legs.get(index + 1), ..self.lesson(leg, starts, seed) };
-                let result = lesson.learn(&|| self.monitor.should_stop());
-                if !self.take(leg, result)? {
-                    return Ok(false);
-                }
-            }
-            let (policy, next) = (&self.learnt[&leg.id].policy, legs.get(index + 1));
-            let driver = Driver { leg, policy, next: next.map(|next| &next.guide) };
-            let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes: 0, seed };
-            arrivals = trial.exits(&driver, &arrivals);
-        }
-        Ok(true)
-    }
-
-    /// Each leg on its own and all at once: the paper's way.
-    fn learn_apart(&mut self, missing: &[Arc<Leg>]) -> Result<bool, FileError> {
-        let learn = |leg: &Arc<Leg>| {
-            let seed = self.settings.seed.child(&format!("leg {}", leg.id), 0);
-            self.lesson(leg, self.starts(leg, seed), seed).learn(&|| self.monitor.should_stop())
-        };
-        let results: Vec<_> = missing.par_iter().map(learn).collect();
-        let mut finished = true;
-        for (leg, result) in missing.iter().zip(results) {
-            finished &= self.take(leg, result)?;
-        }
-        Ok(finished)
-    }
-
-    /// Keeps what was learnt of `leg`; false if learning was stopped.
-    fn take(&mut self, leg: &Leg, result: Result<Learnt, LearnFailure>) -> Result<bool, FileError> {
-        let learnt = match result {
-            Ok(learnt) => learnt,
-            Err(LearnFailure::Stopped) => return Ok(false),
-            // A broken task cannot be learnt: its edge goes, the search goes on.
-            Err(LearnFailure::Broken(_)) => useless(),
-        };
-        self.monitor.learnt(leg, &learnt);
-        self.keep(leg, learnt)?;
-        Ok(true)
-    }
-
     fn lesson<'b>(&'b self, leg: &'b Arc<Leg>, starts: Starts, seed: Seed) -> Lesson<'b> {
         let (workspace, noise, settings) = (self.workspace, &self.settings.noise, &self.settings.learn);
         Lesson { workspace, leg, next: None, tail: &[], starts: Arc::new(starts), noise, settings, seed }
@@ -363,28 +294,6 @@ impl Run<'_> {
                 Starts::spread(self.workspace, leg, &StartSpread::default(), START_POOL, seed)
             }
         }
-    }
-
-    /// Takes the policy of `leg` from another map of the library where its corridor is the same.
-    fn adopt(&mut self, leg: &Leg) -> Result<(), FileError> {
-        if self.learnt.contains_key(&leg.id) || leg.id.role() != Role::Option {
-            return Ok(());
-        }
-        if let Some(stored) = self.library.adopt(&leg.corridor(&self.workspace.grid)) {
-            self.before.push(leg.id);
-            self.keep(leg, stored.learnt)?;
-        }
-        Ok(())
-    }
-
-    fn keep(&mut self, leg: &Leg, learnt: Learnt) -> Result<(), FileError> {
-        if let (LegId::Option(id), true) = (leg.id, learnt.verified.successes > 0) {
-            let corridor = leg.corridor(&self.workspace.grid);
-            let stored = StoredOption { guide: leg.guide.clone(), learnt: learnt.clone(), corridor };
-            self.library.insert(id, stored)?;
-        }
-        self.learnt.insert(leg.id, learnt);
-        Ok(())
     }
 
     fn drivers<'b>(&'b self, legs: &'b [Arc<Leg>]) -> Vec<Driver<'b>> {
@@ -401,68 +310,6 @@ impl Run<'_> {
         let seed = self.settings.seed.child(purpose, index);
         let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes, seed };
         trial.of_chain(&self.drivers(legs), RobotState::at_rest(self.query.start))
-    }
-
-    /// Runs the plan and trains the weak legs on the states in which they were really entered.
-    /// Returns false if the plan holds as often as wanted, or no leg became better.
-    fn repair(&mut self, legs: &[Arc<Leg>], round: u64) -> Result<bool, FileError> {
-        let runs = self.run_chain(legs, self.settings.repair_episodes, "repair", round);
-        let wanted = self.settings.wanted_success;
-        if Tally::count(runs.iter().map(|run| run.outcome == LegOutcome::Done)).rate() >= wanted {
-            return Ok(false);
-        }
-        // n legs that each fail at most a share (1 - wanted) / n make a plan that holds as wanted.
-        let leg_wanted = 1.0 - (1.0 - wanted) / legs.len() as f64;
-        let is_weak = |tally: &Tally| tally.episodes >= 50 && tally.rate() < leg_wanted;
-        let on_arrival = tallies(&runs, legs.len());
-        // Who arrives badly is as much to blame as who cannot cope with it.
-        let is_to_blame =
-            |index: usize| is_weak(&on_arrival[index]) || on_arrival.get(index + 1).is_some_and(is_weak);
-        let weak: Vec<usize> = (0..legs.len()).filter(|&index| is_to_blame(index)).collect();
-        let relearn = |&index: &usize| self.relearn(legs, index, &runs, (leg_wanted, round));
-        let results: Vec<_> = weak.par_iter().map(relearn).collect();
-        let mut better = false;
-        for (index, learnt) in weak.into_iter().zip(results) {
-            if let Some(learnt) = learnt {
-                better = true;
-                self.monitor.learnt(&legs[index], &learnt);
-                self.keep(&legs[index], learnt)?;
-            }
-        }
-        Ok(better)
-    }
-
-    /// A policy for leg number `index` that holds more often than its present one on what `runs`
-    /// arrived with.
-    fn relearn(
-        &self,
-        legs: &[Arc<Leg>],
-        index: usize,
-        runs: &[ChainRun],
-        (wanted, round): (f64, u64),
-    ) -> Option<Learnt> {
-        let leg = &legs[index];
-        let arrivals: Vec<RobotState> =
-            runs.iter().filter_map(|run| run.entries.get(index).copied()).collect();
-        let seed = self.settings.seed.child(&format!("repair {}", leg.id), round);
-        let starts = self.starts(leg, seed).with_arrivals(arrivals);
-        let mut settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
-        // Training is for legs that are weak themselves, and once only.
-        let present =
-            Tally::count(runs.iter().filter(|run| run.entries.len() > index).map(|run| run.passed(index)));
-        if self.learnt[&leg.id].gradient_steps > 0 || present.rate() >= TRAIN_BELOW {
-            settings.train_below = 0.0;
-        }
-        let next = legs.get(index + 1);
-        let drivers = self.drivers(legs);
-        let tail = &drivers[index + 1..drivers.len().min(index + 1 + TAIL_LEGS)];
-        let lesson = Lesson { settings: &settings, next, tail, ..self.lesson(leg, starts, seed) };
-        let old = &self.learnt[&leg.id];
-        let present = lesson.judge(&old.policy);
-        let (judged, mut new) = lesson.learn_judged(&|| self.monitor.should_stop()).ok()?;
-        new.env_steps += old.env_steps;
-        new.gradient_steps += old.gradient_steps;
-        (judged.tally.rate() - present.tally.rate() >= GAIN_MIN).then_some(new)
     }
 
     fn solution(&self, legs: &[Arc<Leg>], runs: &[ChainRun], on_arrival: &[Tally]) -> Solution {
@@ -500,16 +347,6 @@ impl Run<'_> {
 /// The names of `legs`.
 fn ids(legs: &[Arc<Leg>]) -> Vec<LegId> {
     legs.iter().map(|leg| leg.id).collect()
-}
-
-/// Stands for a policy that never succeeds.
-fn useless() -> Learnt {
-    let verified = Tally { episodes: 1, successes: 0 };
-    let policy = crate::policy::OptionPolicy::Follower(crate::policy::Follower {
-        rule: crate::policy::Rule::Pursuit { look_ahead_m: 0.5 },
-        speed_mps: 0.2,
-    });
-    Learnt { policy, verified, mean_time_s: f64::INFINITY, env_steps: 0, gradient_steps: 0 }
 }
 
 /// For each leg: how often it was entered, and how often it then held.

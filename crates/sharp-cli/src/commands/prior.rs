@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,7 +12,7 @@ use serde::Serialize;
 use sharp_options::{OptionKind, OptionSet, OptionSettings};
 use sharp_plan::prior::{self, Course, CourseTask};
 use sharp_plan::{Abstraction, Follower, OptionPolicy, PacedFollower, Prior, Query, Workspace, write_atomic};
-use sharp_rl::{Progress, TrainSettings, TrainState, fine_tune, resume, train};
+use sharp_rl::{Progress, TrainSettings, TrainState, Trained, fine_tune, resume, train};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{GridFrame, OccupancyGrid, Pose, Seed, Stream};
@@ -97,57 +98,14 @@ fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> 
     let bar = progress::bar(u64::from(args.maps), "planning courses");
     let courses = Arc::new(courses(&robot, &kinds, args.maps, Seed(seed).child("prior", 0), &bar)?);
     bar.finish_and_clear();
+    if courses.is_empty() {
+        return Err(Failure::new("TRAINING", format!("no course in {} maps for {}", args.maps, robot.name)));
+    }
     let courses_s = begun.elapsed().as_secs_f64();
-    let settings = TrainSettings {
-        max_env_steps: args.steps.unwrap_or(prior::train_settings().max_env_steps),
-        ..prior::train_settings()
-    };
-    let noises = Arc::new(vec![NoiseModel::nominal(), NoiseModel::harsh(), NoiseModel::biased()]);
-    let task = |index| {
-        let seed = Seed(seed).child("environment", index);
-        CourseTask::new(Arc::clone(&courses), Arc::clone(&noises), seed)
-    };
-    let mut tasks: Vec<CourseTask> = (0..ENVIRONMENTS).map(task).collect();
-    let bar = progress::bar(settings.max_env_steps, "learning");
-    let mut interrupted_state = None;
-    let mut observer = |progress: &Progress<'_>| {
-        bar.set_position(progress.state.env_steps);
-        if let Some(evaluation) = progress.evaluation {
-            let (steps, rate) = (progress.state.env_steps, evaluation.success_rate());
-            let text = format!("{steps} steps: {rate:.3}, {:.1} actions", evaluation.mean_steps);
-            bar.suspend(|| eprintln!("{text}"));
-            bar.set_message(format!("{rate:.3}"));
-        }
-        if !progress::is_interrupted() {
-            return ControlFlow::Continue(());
-        }
-        interrupted_state = Some(progress.state.to_bytes());
-        ControlFlow::Break(())
-    };
-    let mut rng = Seed(seed).stream("sac", 0);
-    let checkpoint = args.out.with_extension("state");
-    let trained = if checkpoint.exists() {
-        let bytes = std::fs::read(&checkpoint).map_err(anyhow::Error::from)?;
-        let state = TrainState::from_bytes(&bytes)
-            .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", checkpoint.display())))?;
-        resume(&mut tasks, state, &settings, &mut observer)
-    } else if let Some(from) = &args.from {
-        let bytes = std::fs::read(from).map_err(anyhow::Error::from)?;
-        let prior = Prior::from_bytes(&bytes)
-            .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", from.display())))?;
-        fine_tune(&mut tasks, prior.networks(), &settings, &mut rng, &mut observer)
-    } else {
-        train(&mut tasks, &settings, &mut rng, &mut observer)
-    }
-    .map_err(|error| Failure::new("TRAINING", error.to_string()))?;
-    bar.finish_and_clear();
-    if let Some(state) = interrupted_state {
-        write_atomic(&checkpoint, &state)?;
-        return Ok(Exit::Interrupted);
-    }
+    let Some(trained) = learn(args, &courses, seed)? else { return Ok(Exit::Interrupted) };
     write_atomic(&args.out, &Prior::new(trained.sac).to_bytes())?;
     // Only now: a crash before would have lost both.
-    let _ = std::fs::remove_file(&checkpoint);
+    let _ = std::fs::remove_file(checkpoint(args));
     let total = begun.elapsed().as_secs_f64();
     let report = TrainReport {
         schema: "sharp.prior.train/1",
@@ -164,9 +122,76 @@ fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> 
     if json {
         say!("{}", to_json(&report));
     } else {
-        say!("{}: {:.3} of the last evaluation's episodes, {total:.0} s", report.file, report.success);
+        say!("{}: holds {:.3} of the evaluation's episodes, {total:.0} s", report.file, report.success);
     }
     Ok(Exit::Done)
+}
+
+/// Where a run that was interrupted goes on.
+fn checkpoint(args: &PriorTrain) -> PathBuf {
+    args.out.with_extension("state")
+}
+
+/// Trains on `courses`, from a checkpoint where one was left; `None` if it was interrupted.
+fn learn(args: &PriorTrain, courses: &Arc<Vec<Course>>, seed: u64) -> Result<Option<Trained>, Failure> {
+    let max_env_steps = args.steps.unwrap_or(prior::train_settings().max_env_steps);
+    let settings = TrainSettings { max_env_steps, ..prior::train_settings() };
+    let noises = Arc::new(vec![NoiseModel::nominal(), NoiseModel::harsh(), NoiseModel::biased()]);
+    let task = |index| {
+        let seed = Seed(seed).child("environment", index);
+        CourseTask::new(Arc::clone(courses), Arc::clone(&noises), seed)
+    };
+    let mut tasks: Vec<CourseTask> = (0..ENVIRONMENTS).map(task).collect();
+    let bar = progress::bar(settings.max_env_steps, "learning");
+    let mut interrupted = None;
+    let mut observer = |progress: &Progress<'_>| {
+        bar.set_position(progress.state.env_steps);
+        if let Some(evaluation) = progress.evaluation {
+            let (steps, rate) = (progress.state.env_steps, evaluation.success_rate());
+            bar.suspend(|| eprintln!("{steps} steps: {rate:.3}, {:.1} actions", evaluation.mean_steps));
+        }
+        if !progress::is_interrupted() {
+            return ControlFlow::Continue(());
+        }
+        interrupted = Some(progress.state.to_bytes());
+        ControlFlow::Break(())
+    };
+    let trained = match (read(&checkpoint(args))?, &args.from) {
+        (Some(bytes), _) => {
+            let state = TrainState::from_bytes(&bytes).map_err(|error| invalid(&checkpoint(args), &error))?;
+            resume(&mut tasks, state, &settings, &mut observer)
+        }
+        (None, Some(from)) => {
+            let mut rng = Seed(seed).stream("sac", 0);
+            fine_tune(&mut tasks, prior_file(from)?.networks(), &settings, &mut rng, &mut observer)
+        }
+        (None, None) => train(&mut tasks, &settings, &mut Seed(seed).stream("sac", 0), &mut observer),
+    };
+    let trained = trained.map_err(|error| Failure::new("TRAINING", error.to_string()))?;
+    bar.finish_and_clear();
+    if let Some(state) = interrupted {
+        write_atomic(&checkpoint(args), &state)?;
+        return Ok(None);
+    }
+    Ok(Some(trained))
+}
+
+/// The bytes of `path`, or `None` if there is no such file.
+fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
+    match std::fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(Failure::new("FILE_UNREADABLE", format!("{}: {error}", path.display()))),
+    }
+}
+
+fn prior_file(path: &Path) -> Result<Prior, Failure> {
+    let missing = || Failure::new("FILE_UNREADABLE", format!("{}: no such file", path.display()));
+    Prior::from_bytes(&read(path)?.ok_or_else(missing)?).map_err(|error| invalid(path, &error))
+}
+
+fn invalid(path: &Path, error: &dyn std::fmt::Display) -> Failure {
+    Failure::new("FILE_INVALID", format!("{}: {error}", path.display()))
 }
 
 /// Courses in `maps` generated maps of `kinds` in turn.
@@ -238,11 +263,7 @@ fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> 
     bar.finish_and_clear();
     let prior = match &args.from {
         None => Prior::shipped(&robot).clone(),
-        Some(file) => {
-            let bytes = std::fs::read(file).map_err(anyhow::Error::from)?;
-            Prior::from_bytes(&bytes)
-                .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", file.display())))?
-        }
+        Some(file) => prior_file(file)?,
     };
     let mut policies = BTreeMap::new();
     for (name, policy) in candidates(&prior, &robot, &noise) {
