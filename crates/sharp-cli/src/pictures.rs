@@ -15,13 +15,8 @@ const PNG_SIDE_PX: u32 = 1200;
 
 /// Writes `svg` as `NAME.svg` and `NAME.png` into `folder`.
 pub(crate) fn write(folder: &Path, name: &str, svg: &str) -> Result<(), Failure> {
-    write_both(folder, name, svg, svg)
-}
-
-/// Writes `svg` as `NAME.svg` and `plain`, the same without a font, as `NAME.png` into `folder`.
-pub(crate) fn write_both(folder: &Path, name: &str, svg: &str, plain: &str) -> Result<(), Failure> {
     write_atomic(&folder.join(format!("{name}.svg")), svg.as_bytes())?;
-    write_atomic(&folder.join(format!("{name}.png")), &svg_to_png(plain, PNG_SIDE_PX)?)?;
+    write_atomic(&folder.join(format!("{name}.png")), &svg_to_png(svg, PNG_SIDE_PX)?)?;
     Ok(())
 }
 

@@ -7,8 +7,8 @@ use super::lines::ResultLine;
 use crate::render::Anchor;
 
 /// The plotted square: left, right, top, bottom.
-const AREA: [f64; 4] = [46.0, 346.0, 28.0, 328.0];
-const HEIGHT: f64 = 372.0;
+const AREA: [f64; 4] = [46.0, 336.0, 32.0, 322.0];
+const HEIGHT: f64 = 368.0;
 
 pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
     let solved: Vec<&ResultLine> = lines.iter().copied().filter(|line| line.is_solved()).collect();
@@ -49,7 +49,7 @@ fn is_inside(line: &ResultLine) -> bool {
     (tally.lower95()..=tally.upper95()).contains(&line.predicted_success)
 }
 
-/// A tenth below everything that is shown, so that what is near 1 can be told apart.
+/// The tenth at or below everything that is shown: what is near 1 can be told apart.
 fn lowest(lines: &[&ResultLine]) -> f64 {
     let low = lines.iter().map(|line| line.tally().lower95().min(line.predicted_success)).fold(0.9, f64::min);
     ((low * 10.0).floor() / 10.0).clamp(0.0, 0.9)
@@ -78,7 +78,7 @@ fn panel(robot: &str, lines: &[&ResultLine], low: f64) -> Panel {
     across.draw(chart, [top, bottom], percent);
     up.draw_upright(chart, [left, right], percent);
     chart.line([left, bottom], [right, top], SOFT, 1.0);
-    chart.text([(left + right) / 2.0, bottom + 30.0], Anchor::Middle, TEXT, INK, "predicted success");
+    chart.text([(left + right) / 2.0, bottom + 32.0], Anchor::Middle, TEXT, INK, "predicted success");
     chart.text([right, top - 10.0], Anchor::End, TEXT, INK, "measured success, upwards");
     for line in lines {
         let (tally, style) = (line.tally(), Style::of(&line.options));

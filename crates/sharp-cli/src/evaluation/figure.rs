@@ -15,10 +15,14 @@ pub(super) const LEFT: f64 = 34.0;
 pub(super) const RIGHT: f64 = 304.0;
 /// Height that the title of a panel takes.
 pub(super) const TOP: f64 = 24.0;
+/// Height that the title of the whole figure takes in a file of its own.
+const TITLE: f64 = 26.0;
 /// Size of text.
 pub(super) const TEXT: f64 = 11.0;
 pub(super) const INK: &str = "#1a1a1a";
 pub(super) const SOFT: &str = "#595959";
+/// Pixels of a PNG per user unit.
+const PNG_SCALE: f64 = 2.0;
 const RULE: &str = "#dcdcdc";
 
 /// One figure of the page.
@@ -55,14 +59,18 @@ impl Figure {
         self.sheet().to_svg(self.title, Lettering::Text)
     }
 
-    /// The same without a font.
-    pub(super) fn to_plain_svg(&self) -> String {
-        self.sheet().to_svg(self.title, Lettering::Strokes)
+    /// The same without a font, and the longer side of its PNG in pixels.
+    pub(super) fn to_plain_svg(&self) -> (String, u32) {
+        let sheet = self.sheet();
+        (sheet.to_svg(self.title, Lettering::Strokes), (PNG_SCALE * sheet.longer_side()) as u32)
     }
 
     fn sheet(&self) -> Chart {
         let charts: Vec<Chart> = self.panels.iter().map(|panel| panel.chart.clone()).collect();
-        Chart::grid(&self.legend, &charts, 3)
+        let mut header = Chart::new(WIDTH, self.legend.height() + TITLE);
+        header.text([0.0, 14.0], Anchor::Start, TEXT + 5.0, INK, self.title);
+        header.append(&self.legend, [0.0, TITLE]);
+        Chart::grid(&header, &charts, 3)
     }
 }
 
@@ -111,7 +119,7 @@ impl Axis {
         for tick in self.ticks() {
             let x = self.at(tick);
             chart.line([x, top], [x, bottom], RULE, 1.0);
-            chart.text([x, bottom + 13.0], Anchor::Middle, TEXT, SOFT, text(tick));
+            chart.text([x, bottom + 15.0], Anchor::Middle, TEXT, SOFT, text(tick));
         }
     }
 
@@ -125,7 +133,7 @@ impl Axis {
         for tick in self.ticks() {
             let y = self.at(tick);
             chart.line([left, y], [right, y], RULE, 1.0);
-            chart.text([left - 4.0, y + 4.0], Anchor::End, TEXT, SOFT, text(tick));
+            chart.text([left - 8.0, y + 4.0], Anchor::End, TEXT, SOFT, text(tick));
         }
     }
 }

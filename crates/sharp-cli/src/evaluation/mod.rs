@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use sharp_plan::write_atomic;
 
 use crate::outcome::Failure;
-use crate::pictures;
+use crate::render::svg_to_png;
 
 pub(crate) use lines::{
     BaselineLine, ResultLine, group, plan_folder, read_baselines, read_results, row_text,
@@ -48,7 +48,9 @@ pub(crate) fn write(evaluation: &Evaluation<'_>) -> Result<PathBuf, Failure> {
     write_atomic(&folder.join("tables.md"), table(&evaluation.lines).as_bytes())?;
     let figures = figures(evaluation);
     for figure in &figures {
-        pictures::write_both(&folder, figure.name, &figure.to_svg(), &figure.to_plain_svg())?;
+        let (plain, side_px) = figure.to_plain_svg();
+        write_atomic(&folder.join(format!("{}.svg", figure.name)), figure.to_svg().as_bytes())?;
+        write_atomic(&folder.join(format!("{}.png", figure.name)), &svg_to_png(&plain, side_px)?)?;
     }
     let pictures = gallery::collect(evaluation)?;
     let page = folder.join("index.html");

@@ -70,8 +70,9 @@ fn panel(groups: &[(Group<'_>, Reuse)]) -> Panel {
         top += GAP;
         panel.chart.text([0.0, top + 11.0], Anchor::Start, TEXT, INK, groups[0].0.1);
         for ((_, _, options), reuse) in groups {
-            let width = axis.at(share(reuse)) - LEFT;
-            panel.chart.rect([LEFT, top + 1.0], [width, BAR - 3.0], Style::of(options).color);
+            let (end, y, style) = (axis.at(share(reuse)), top + BAR / 2.0, Style::of(options));
+            panel.chart.line([LEFT, y], [end, y], style.color, 4.0);
+            panel.chart.marker([end, y], style.shape, 4.5, style.color);
             let number = format!("{}/{}", reuse.reused, reuse.uses);
             panel.chart.text([RIGHT + 8.0, top + 11.0], Anchor::Start, TEXT, INK, number);
             top += BAR;

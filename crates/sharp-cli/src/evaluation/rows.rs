@@ -32,6 +32,8 @@ struct Shown {
     values: fn(&Row<'_>) -> Option<[f64; 3]>,
     /// The number at the right.
     number: fn(&Row<'_>) -> String,
+    /// The axis of a panel with these rows.
+    axis: fn(&[Row<'_>]) -> Axis,
     /// How the axis writes its values.
     tick: fn(f64) -> String,
 }
@@ -42,17 +44,18 @@ pub(super) fn success(lines: &[&ResultLine], baselines: &[BaselineLine]) -> Figu
     let shown = Shown {
         values: |row| Some([row.tally.lower95(), row.tally.rate(), row.tally.upper95()]),
         number: |row| format!("{}/{}", row.tally.successes, row.tally.episodes),
+        axis: |_| Axis { low: 0.0, high: 1.0, ends: [LEFT, RIGHT] },
         tick: percent,
     };
-    let axis = Axis { low: 0.0, high: 1.0, ends: [LEFT, RIGHT] };
     Figure {
         name: "success",
         title: "Success of each problem",
         caption: "Share of executions that reached the goal without touching a wall, with Wilson's 95 % \
-                  interval; a problem without a plan counts as failed."
+                  interval; a problem without a plan counts as failed. Only RRT with contact allowed may \
+                  touch walls, back off and go on."
             .to_owned(),
         legend: legend(rows.iter().map(|row| row.method)),
-        panels: panels(&rows, &shown, &axis),
+        panels: panels(&rows, &shown),
         table: table(&rows),
     }
 }
@@ -63,17 +66,17 @@ pub(super) fn driving(lines: &[&ResultLine], baselines: &[BaselineLine]) -> Figu
     let shown = Shown {
         values: |row| (row.tally.successes > 0).then_some([row.sim_time_s; 3]),
         number: |row| if row.tally.successes > 0 { seconds(row.sim_time_s) } else { "never".to_owned() },
+        axis: |rows| Axis::from_zero(rows.iter().map(|row| row.sim_time_s).fold(0.0, f64::max)),
         tick: plain,
     };
-    let axis = Axis::from_zero(rows.iter().map(|row| row.sim_time_s).fold(0.0, f64::max));
     Figure {
         name: "driving",
         title: "Driving time of each problem",
-        caption: "Mean simulated time of the executions that reached the goal, seconds. Who fails often \
-                  on the long ways looks quicker than he is: read it beside the success."
+        caption: "Mean simulated time of the executions that reached the goal, seconds. A method that \
+                  fails on the long ways looks quicker than it is: read it beside the success. Each panel has an axis of its own."
             .to_owned(),
         legend: legend(rows.iter().map(|row| row.method)),
-        panels: panels(&rows, &shown, &axis),
+        panels: panels(&rows, &shown),
         table: table(&rows),
     }
 }
@@ -105,16 +108,17 @@ fn rows<'a>(lines: &[&'a ResultLine], baselines: &'a [BaselineLine]) -> Vec<Row<
     rows
 }
 
-fn panels(rows: &[Row<'_>], shown: &Shown, axis: &Axis) -> Vec<Panel> {
+fn panels(rows: &[Row<'_>], shown: &Shown) -> Vec<Panel> {
     let same = |a: &Row<'_>, b: &Row<'_>| (a.env, a.robot) == (b.env, b.robot);
-    rows.chunk_by(same).map(|rows| panel(rows, shown, axis)).collect()
+    rows.chunk_by(same).map(|rows| panel(rows, shown)).collect()
 }
 
-fn panel(rows: &[Row<'_>], shown: &Shown, axis: &Axis) -> Panel {
+fn panel(rows: &[Row<'_>], shown: &Shown) -> Panel {
     let problems: Vec<&[Row<'_>]> = rows.chunk_by(|a, b| a.problem == b.problem).collect();
     let bottom = TOP + GAP * problems.len() as f64 + ROW * rows.len() as f64;
     let title = format!("environment {}, {}", rows[0].env, rows[0].robot);
     let mut panel = Panel::new(title, bottom + 18.0);
+    let axis = (shown.axis)(rows);
     axis.draw(&mut panel.chart, [TOP, bottom], shown.tick);
     let mut top = TOP;
     for rows in problems {
@@ -122,7 +126,7 @@ fn panel(rows: &[Row<'_>], shown: &Shown, axis: &Axis) -> Panel {
         let label = format!("P{}", rows[0].problem);
         panel.chart.text([0.0, top + 10.0], Anchor::Start, TEXT, INK, label);
         for row in rows {
-            mark(&mut panel, row, shown, axis, top + ROW / 2.0);
+            mark(&mut panel, row, shown, &axis, top + ROW / 2.0);
             top += ROW;
         }
     }

@@ -135,6 +135,10 @@ impl Chart {
         self.marks.extend(other.marks.iter().cloned().map(|mark| mark.moved(offset)));
     }
 
+    pub(crate) const fn height(&self) -> f64 {
+        self.height
+    }
+
     /// The longer side, user units.
     pub(crate) const fn longer_side(&self) -> f64 {
         self.width.max(self.height)
