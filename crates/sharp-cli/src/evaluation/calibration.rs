@@ -21,7 +21,7 @@ pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
         title: "Predicted and measured success",
         caption: format!(
             "One marker a solved problem: the success predicted when it was solved, and the share counted \
-             afterwards on executions with other noise, with Wilson's 95 % interval. Predictions that were \
+             afterwards on executions with fresh noise, with Wilson's 95 % interval. Predictions that were \
              right lie on the diagonal. {inside} of {} predictions lie in the interval measured.",
             solved.len()
         ),

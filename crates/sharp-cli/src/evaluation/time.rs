@@ -10,8 +10,11 @@ use crate::report::SolveTimes;
 const BAR: f64 = 13.0;
 const HEADER: f64 = 20.0;
 
-/// Phases in the order of the algorithm, with their colours.
-const PHASES: [(&str, &str, fn(&SolveTimes) -> f64); 7] = [
+/// A phase: its name, its colour, and how long it took.
+type Phase = (&'static str, &'static str, fn(&SolveTimes) -> f64);
+
+/// Phases in the order of the algorithm.
+const PHASES: [Phase; 7] = [
     ("regions", "#cc79a7", |time| time.regions),
     ("abstraction", "#e69f00", |time| time.abstraction),
     ("search", "#f0e442", |time| time.search),
