@@ -450,6 +450,9 @@ pub(crate) struct Eval {
     /// Only these problems of each map: numbers from 1, separated by commas.
     #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
     pub(crate) problems: Vec<usize>,
+    /// What `cargo xtask baselines` measured, for the figures; those under other noise are left out.
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub(crate) baselines: Option<PathBuf>,
 }
 
 /// Suites of problems.

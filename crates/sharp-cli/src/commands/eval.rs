@@ -1,20 +1,22 @@
-//! `sharp eval`: suites of problems, one JSON line a result, and a table.
+//! `sharp eval`: suites of problems, one JSON line a result, and a report.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
+use clap::ValueEnum;
 use sharp_plan::{RunSettings, run as run_plan, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{AbstractionArgs, Eval, Guide, Kind, Learning, MapArgs, Metric, Solve, Suite, Unknown};
 use crate::commands::solve::{Solved, solve_problem};
+use crate::evaluation::{
+    self, BaselineLine, Evaluation, ResultLine, group, plan_folder, read_baselines, read_results, row_text,
+};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::pictures;
 use crate::progress::{bar, is_interrupted};
-use crate::report::{Reuse, RunReport, SolveTimes};
+use crate::report::RunReport;
 
 /// One problem for one robot with one kind of option.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,48 +27,11 @@ struct Case {
     problem: usize,
 }
 
-/// `sharp.result/1`: one line of `results.jsonl`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct ResultLine {
-    schema: String,
-    version: String,
-    method: String,
-    learning: String,
-    env: String,
-    problem: usize,
-    robot: String,
-    options: String,
-    #[serde(default = "net")]
-    regions: String,
-    /// Options synthesised in the environment.
-    #[serde(default)]
-    options_available: usize,
-    noise: String,
-    trial: u32,
-    seed: u64,
-    status: String,
-    episodes: u32,
-    successes: u32,
-    collisions: u32,
-    timeouts: u32,
-    recoveries: u32,
-    mean_sim_time_s: f64,
-    predicted_success: f64,
-    reuse: Reuse,
-    env_steps: u64,
-    gradient_steps: u64,
-    time_s: SolveTimes,
-}
-
-/// What results were made with before there was a choice.
-fn net() -> String {
-    "net".to_owned()
-}
-
 pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
     let cases = selected(cases(args.suite)?, args)?;
     let path = args.out.join("results.jsonl");
-    let mut lines = read_lines(&path)?;
+    let baselines = baselines(args)?;
+    let mut lines = read_results(&path)?;
     let progress = bar(cases.len() as u64, "evaluating");
     for case in &cases {
         if is_interrupted() {
@@ -87,17 +52,54 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
     progress.finish_and_clear();
     let wanted: Vec<&ResultLine> =
         lines.iter().filter(|line| cases.iter().any(|case| is_result_of(line, case, args, seed))).collect();
-    let table = table(&wanted);
-    write_atomic(&args.out.join("report").join("tables.md"), table.as_bytes())?;
+    let command = command(args, seed);
+    let evaluation = Evaluation { lines: wanted, baselines, command, out: &args.out };
+    let page = evaluation::write(&evaluation)?;
     if json {
-        for line in wanted {
+        for line in evaluation.lines {
             say!("{}", to_json(line));
         }
     } else {
-        say!("{}", table);
+        say!("{}", evaluation::table(&evaluation.lines));
         say!("results in {}, pictures of every plan in {}", path.display(), args.out.join("plans").display());
+        say!("report in {}", page.display());
     }
     Ok(Exit::Done)
+}
+
+/// The baselines under the noise of this evaluation.
+fn baselines(args: &Eval) -> Result<Vec<BaselineLine>, Failure> {
+    let lines = args.baselines.as_deref().map(read_baselines).transpose()?.unwrap_or_default();
+    Ok(lines.into_iter().filter(|line| line.noise == args.noise).collect())
+}
+
+/// The call that gives the same results, with everything that decides them.
+fn command(args: &Eval, seed: u64) -> String {
+    let name = |value: Option<clap::builder::PossibleValue>| {
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    };
+    let numbers: Vec<String> = args.problems.iter().map(ToString::to_string).collect();
+    let mut command = format!(
+        "sharp --seed {seed} eval {} --episodes {} --learning {} --noise {} --regions {}",
+        name(args.suite.to_possible_value()),
+        args.episodes,
+        learning_name(args.learning),
+        args.noise,
+        args.regions
+    );
+    for (flag, value) in [
+        ("envs", args.envs.join(",")),
+        ("robots", args.robots.join(",")),
+        ("options", name(args.options.and_then(|kind| kind.to_possible_value()))),
+        ("problems", numbers.join(",")),
+        ("baselines", args.baselines.as_ref().map_or_else(String::new, |path| path.display().to_string())),
+        ("out", args.out.display().to_string()),
+    ] {
+        if !value.is_empty() {
+            command += &format!(" --{flag} {value}");
+        }
+    }
+    command
 }
 
 fn cases(suite: Suite) -> Result<Vec<Case>, Failure> {
@@ -165,29 +167,11 @@ const fn learning_name(learning: Learning) -> &'static str {
     }
 }
 
-/// The results that an earlier run left; a last line cut short by a crash is dropped.
-fn read_lines(path: &Path) -> Result<Vec<ResultLine>, Failure> {
-    let Ok(text) = std::fs::read_to_string(path) else { return Ok(vec![]) };
-    text.lines()
-        .enumerate()
-        .map(|(index, line)| {
-            serde_json::from_str(line).map_err(|error| {
-                Failure::new("FILE_INVALID", format!("{} line {}: {error}", path.display(), index + 1))
-            })
-        })
-        .collect()
-}
-
 /// Solves and runs one case; `None` if it was interrupted.
 fn evaluate(case: &Case, args: &Eval, seed: u64) -> Result<Option<ResultLine>, Failure> {
     let kind = sharp_plan::kind_name(case.kind.into());
-    // Problems of one environment, robot and kind share a library: P2 to P5 reuse what P1 learnt.
-    let learning = learning_name(args.learning);
-    let mut group = format!("{}-{}-{kind}-{learning}-{seed}", case.env, case.robot);
-    if args.regions != net() {
-        group = format!("{group}-{}", args.regions);
-    }
-    let folder = args.out.join("plans").join(format!("{group}-p{}", case.problem));
+    let group = group(&case.env, case.robot, kind, learning_name(args.learning), seed, &args.regions);
+    let folder = plan_folder(&args.out, &group, case.problem);
     let solve = solve_args(case, args, args.out.join("library").join(&group), folder.clone());
     let Solved { report, plan } = solve_problem(&solve, seed)?;
     if plan.is_none() && is_interrupted() {
@@ -262,54 +246,19 @@ fn drive(
     Ok(RunReport::new(plan, &driven))
 }
 
-fn row_text(line: &ResultLine) -> String {
-    format!(
-        "{} P{} {} {}: {} of {} (predicted {:.3}), reused {} of {}, {:.1} s",
-        line.env,
-        line.problem,
-        line.robot,
-        line.options,
-        line.successes,
-        line.episodes,
-        line.predicted_success,
-        line.reuse.reused,
-        line.reuse.uses,
-        line.time_s.total
-    )
-}
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
 
-/// The results as a Markdown table.
-fn table(lines: &[&ResultLine]) -> String {
-    let mut text = String::from(
-        "| env | problem | robot | options | success | 95 % interval | predicted | reused | driving s | regions s | abstraction s | search s | guides s | learn s | verify s | total s |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-    );
-    for line in lines {
-        let tally = sharp_plan::Tally { episodes: line.episodes, successes: line.successes };
-        let time = &line.time_s;
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "| {} | P{} | {} | {} | {}/{} | {:.2}-{:.2} | {:.3} | {}/{} | {:.1} | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} |",
-            line.env,
-            line.problem,
-            line.robot,
-            line.options,
-            line.successes,
-            line.episodes,
-            tally.lower95(),
-            tally.upper95(),
-            line.predicted_success,
-            line.reuse.reused,
-            line.reuse.uses,
-            line.mean_sim_time_s,
-            time.regions,
-            time.abstraction,
-            time.search,
-            time.guide,
-            time.learn,
-            time.verify,
-            time.total
-        );
+    use super::*;
+    use crate::args::{Cli, Command};
+
+    #[test]
+    fn the_command_of_a_report_says_everything_that_decides_it() {
+        let text = "sharp --seed 7 eval quick --episodes 50 --learning fast --noise harsh --regions grid \
+                    --envs a,b --options interface --problems 1,3 --out here";
+        let cli = Cli::parse_from(text.split_whitespace());
+        let Command::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
+        assert_eq!(command(args, cli.seed), text);
     }
-    text
 }

@@ -27,7 +27,7 @@ pub(super) fn strokes(value: u32, center: [f64; 2], height: f64) -> PathData {
 }
 
 /// The strokes of 0 to 9 on a lattice 4 wide and 6 high, y downwards.
-const GLYPHS: [&[&[[f64; 2]]]; 10] = [
+pub(super) const GLYPHS: [&[&[[f64; 2]]]; 10] = [
     &[&[[1., 0.], [3., 0.], [4., 1.], [4., 5.], [3., 6.], [1., 6.], [0., 5.], [0., 1.], [1., 0.], [3., 0.]]],
     &[&[[0.8, 1.3], [2.4, 0.], [2.4, 6.]]],
     &[&[[0., 1.], [1., 0.], [3., 0.], [4., 1.], [4., 2.2], [0., 6.], [4., 6.]]],

@@ -1,6 +1,16 @@
 //! A writer of the little SVG that the pictures need.
 
+use std::borrow::Cow;
 use std::fmt::Write;
+
+/// `text` for the inside of an element or attribute, of SVG and of HTML.
+pub(crate) fn escape(text: &str) -> Cow<'_, str> {
+    if !text.contains(['&', '<', '>', '"', '\'']) {
+        return Cow::Borrowed(text);
+    }
+    let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    Cow::Owned(text.replace('"', "&quot;").replace('\'', "&#39;"))
+}
 
 /// Writes `value` with at most two decimals: a hundredth of a cell is finer than any pixel.
 pub(super) fn number(value: f64) -> String {
@@ -54,6 +64,12 @@ impl Svg {
         self.tag(name, attributes, "/>\n");
     }
 
+    /// Writes an element that holds `text`.
+    pub(super) fn text(&mut self, name: &str, attributes: &[(&str, String)], text: &str) {
+        self.tag(name, attributes, ">");
+        let _ = writeln!(self.text, "{}</{name}>", escape(text));
+    }
+
     /// Closes everything and returns the document.
     pub(super) fn finish(mut self) -> String {
         while !self.open.is_empty() {
@@ -65,8 +81,7 @@ impl Svg {
     fn tag(&mut self, name: &str, attributes: &[(&str, String)], end: &str) {
         let _ = write!(self.text, "<{name}");
         for (key, value) in attributes {
-            debug_assert!(!value.contains(['"', '<', '&']), "attribute {key} needs escaping: {value}");
-            let _ = write!(self.text, " {key}=\"{value}\"");
+            let _ = write!(self.text, " {key}=\"{}\"", escape(value));
         }
         self.text.push_str(end);
     }
@@ -133,6 +148,17 @@ mod tests {
         {
             assert_eq!(number(value), text, "{value}");
         }
+    }
+
+    #[test]
+    fn text_is_escaped() {
+        let mut svg = Svg::new([0.0, 0.0, 1.0, 1.0], 1.0);
+        svg.text("text", &[("class", "\"x\"".into())], "a < b & 'c'");
+        let document = svg.finish();
+        assert!(
+            document.contains("<text class=\"&quot;x&quot;\">a &lt; b &amp; &#39;c&#39;</text>"),
+            "{document}"
+        );
     }
 
     #[test]

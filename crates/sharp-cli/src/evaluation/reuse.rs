@@ -1,0 +1,99 @@
+//! The figure of reuse: how many of the options that plans used had been learnt before.
+
+use std::collections::BTreeMap;
+
+use super::figure::{Axis, Figure, INK, LEFT, Panel, RIGHT, Style, TEXT, TOP, Table, legend, percent};
+use super::lines::ResultLine;
+use crate::render::Anchor;
+use crate::report::Reuse;
+
+const BAR: f64 = 15.0;
+const GAP: f64 = 5.0;
+
+/// Robot, environment, kind of option.
+type Group<'a> = (&'a str, &'a str, &'a str);
+
+pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
+    let sums: Vec<(Group<'_>, Reuse)> = sums(lines).into_iter().collect();
+    Figure {
+        name: "reuse",
+        title: "Reuse of options",
+        caption: "Option uses of all problems of an environment, and how many were reused. An option use is \
+                  reused if its policy existed before the problem began. The first problem of an \
+                  environment reuses nothing; legs from the start and to the goal are no options."
+            .to_owned(),
+        legend: legend(lines.iter().map(|line| line.options.as_str())),
+        panels: sums.chunk_by(|a, b| a.0.0 == b.0.0).map(panel).collect(),
+        table: Table {
+            columns: vec!["env", "robot", "options", "reused", "uses", "share"],
+            rows: sums.iter().map(row).collect(),
+        },
+    }
+}
+
+fn sums<'a>(lines: &[&'a ResultLine]) -> BTreeMap<Group<'a>, Reuse> {
+    let mut sums = BTreeMap::new();
+    for line in lines {
+        let sum = sums
+            .entry((line.robot.as_str(), line.env.as_str(), line.options.as_str()))
+            .or_insert(Reuse { uses: 0, reused: 0 });
+        sum.uses += line.reuse.uses;
+        sum.reused += line.reuse.reused;
+    }
+    sums
+}
+
+/// The share reused; 0 if no option was used.
+fn share(reuse: &Reuse) -> f64 {
+    reuse.reused as f64 / reuse.uses.max(1) as f64
+}
+
+fn row(((robot, env, options), reuse): &(Group<'_>, Reuse)) -> Vec<String> {
+    vec![
+        (*env).to_owned(),
+        (*robot).to_owned(),
+        (*options).to_owned(),
+        reuse.reused.to_string(),
+        reuse.uses.to_string(),
+        percent(share(reuse)),
+    ]
+}
+
+fn panel(groups: &[(Group<'_>, Reuse)]) -> Panel {
+    let envs: Vec<_> = groups.chunk_by(|a, b| a.0.1 == b.0.1).collect();
+    let bottom = TOP + GAP * envs.len() as f64 + BAR * groups.len() as f64;
+    let mut panel = Panel::new(groups[0].0.0.to_owned(), bottom + 18.0);
+    let axis = Axis { low: 0.0, high: 1.0, ends: [LEFT, RIGHT] };
+    axis.draw(&mut panel.chart, [TOP, bottom], percent);
+    let mut top = TOP;
+    for groups in envs {
+        top += GAP;
+        panel.chart.text([0.0, top + 11.0], Anchor::Start, TEXT, INK, groups[0].0.1);
+        for ((_, _, options), reuse) in groups {
+            let (end, y, style) = (axis.at(share(reuse)), top + BAR / 2.0, Style::of(options));
+            panel.chart.line([LEFT, y], [end, y], style.color, 4.0);
+            panel.chart.marker([end, y], style.shape, 4.5, style.color);
+            let number = format!("{}/{}", reuse.reused, reuse.uses);
+            panel.chart.text([RIGHT + 8.0, top + 11.0], Anchor::Start, TEXT, INK, number);
+            top += BAR;
+        }
+    }
+    panel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn problems_of_an_environment_are_added_up() {
+        let lines = [1, 2].map(|problem| ResultLine::example("a", "limo", "centroid", problem));
+        let other = ResultLine {
+            reuse: Reuse { uses: 0, reused: 0 },
+            ..ResultLine::example("b", "limo", "centroid", 1)
+        };
+        let figure = figure(&[&lines[0], &lines[1], &other]);
+        let rows: Vec<String> = figure.table.rows.iter().map(|row| row.join(" ")).collect();
+        assert_eq!(rows, ["a limo centroid 2 8 25 %", "b limo centroid 0 0 0 %"]);
+    }
+}
