@@ -16,7 +16,7 @@ from stable_baselines3.common.logger import Logger
 
 OBSERVATION_LEN, ACTION_LEN = 51, 2
 BUFFER = 10_000
-CHUNK = 20
+CHUNK = 10
 
 
 def box(length, bound):
@@ -123,9 +123,9 @@ def curve(seed, result):
     result["steps"], result["returns"] = [], []
     begun = time.perf_counter()
     for _ in range(6):
-        model.learn(500, reset_num_timesteps=False)
+        model.learn(250, reset_num_timesteps=False)
         result["steps"].append(model.num_timesteps)
-        result["returns"].append(evaluate(model, world, 100))
+        result["returns"].append(evaluate(model, world, 30))
     result["rate"] = model.num_timesteps / (time.perf_counter() - begun)
 
 

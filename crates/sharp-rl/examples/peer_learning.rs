@@ -26,7 +26,7 @@ const SPEC: EnvironmentSpec = EnvironmentSpec { observation_len: 51, action_len:
 const SIZES: [(usize, usize); 2] = [(256, 256), (64, 128)];
 const BUFFER: usize = 10_000;
 /// Gradient steps between two looks at the clock.
-const CHUNK: u32 = 20;
+const CHUNK: u32 = 10;
 
 fn main() {
     let usage = "usage: peer_learning updates SECONDS | curve SEED";
@@ -101,7 +101,7 @@ fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
     buffer
 }
 
-/// Learns the point mass: mean returns of 100 episodes every 500 steps, and the time it took.
+/// Learns the point mass: mean returns of 30 episodes every 250 steps, and the time it took.
 fn curve(seed: u64) -> Value {
     let settings = TrainSettings {
         sac: SacSettings {
@@ -117,9 +117,9 @@ fn curve(seed: u64) -> Value {
             exploration: Exploration::Uniform,
             ..SacSettings::default()
         },
-        max_env_steps: 3_000,
-        evaluate_every: 500,
-        evaluation_episodes: 100,
+        max_env_steps: 1_500,
+        evaluate_every: 250,
+        evaluation_episodes: 30,
         stop: StopRule::Never,
         ..TrainSettings::default()
     };
