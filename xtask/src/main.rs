@@ -10,6 +10,7 @@ mod bench;
 mod ci;
 mod eval;
 mod peers;
+mod peers_learning;
 mod peers_regions;
 mod process;
 mod stats;
@@ -35,7 +36,7 @@ usage: cargo xtask COMMAND
   baselines [--noise N,..] [--methods M,..] [--envs E,..] [--episodes N] [--out DIR]
                          sharp baseline on every problem, as tables; goes on where it was
   bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
-  bench peers [sim|regions]
+  bench peers [sim|learning|regions]
                          the same work here and in other programs, as JSON lines
                          [--rounds N] [--seconds S] [--map M]";
 

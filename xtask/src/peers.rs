@@ -12,9 +12,9 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, bail, ensure};
 use serde_json::{Value, json};
 
-use crate::peers_regions;
 use crate::process::{cargo, flag};
 use crate::tree::root;
+use crate::{peers_learning, peers_regions};
 
 const MAPS: [&str; 4] = ["grid_15", "grid_75", "boxes_100", "boxes_10000"];
 /// Our simulators, the beginning of their lines and the layouts of the peer they stand against.
@@ -39,8 +39,11 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     if suite == "regions" {
         return peers_regions::run(&args[1..]);
     }
+    if suite == "learning" {
+        return peers_learning::run(&args[1..]);
+    }
     let is_known = suite == "sim" || suite.starts_with('-');
-    ensure!(is_known, "no comparison is called {suite:?}, there are sim, regions");
+    ensure!(is_known, "no comparison is called {suite:?}, there are sim, learning, regions");
     let rounds: usize = flag(args, "--rounds").unwrap_or("3").parse().context("--rounds")?;
     ensure!(rounds > 0, "--rounds is 0, must be at least 1");
     let seconds: f64 = flag(args, "--seconds").unwrap_or("3").parse().context("--seconds")?;
@@ -71,7 +74,7 @@ struct Sides {
 
 impl Sides {
     fn prepare(seconds: String) -> anyhow::Result<Self> {
-        Ok(Self { example: example()?, python: python()?, seconds })
+        Ok(Self { example: example()?, python: python(&folder(), "requirements.txt")?, seconds })
     }
 
     /// Measures every simulator and layout on `map`, by turns.
@@ -172,15 +175,16 @@ fn folder() -> PathBuf {
     root().join("target/peers")
 }
 
-/// The interpreter of a virtual environment with the peers' packages, made on the first call.
-fn python() -> anyhow::Result<PathBuf> {
-    let python = folder().join("bin/python");
+/// The interpreter of the virtual environment in `folder`, made on the first call, with the packages
+/// that a file of `assets/peers` lists.
+pub(crate) fn python(folder: &Path, requirements: &str) -> anyhow::Result<PathBuf> {
+    let python = folder.join("bin/python");
     if !python.exists() {
-        succeed(Command::new("python3").args(["-m", "venv"]).arg(folder()))?;
+        succeed(Command::new("python3").args(["-m", "venv"]).arg(folder))?;
     }
     let mut install = Command::new(&python);
     install.args(["-m", "pip", "install", "--quiet", "--requirement"]);
-    succeed(install.arg(root().join("assets/peers/requirements.txt")))?;
+    succeed(install.arg(root().join("assets/peers").join(requirements)))?;
     Ok(python)
 }
 
@@ -235,7 +239,7 @@ mod tests {
     #[test]
     fn unknown_suites_and_maps_are_refused_before_anything_is_built() {
         for (args, expected) in [
-            (vec!["cooking"], "no comparison is called \"cooking\", there are sim, regions"),
+            (vec!["cooking"], "no comparison is called \"cooking\", there are sim, learning, regions"),
             (vec!["sim", "--map", "moon"], "no map is called \"moon\", there are grid_15, grid_75"),
             (vec!["--rounds", "0"], "--rounds is 0, must be at least 1"),
         ] {

@@ -12,7 +12,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
-use crate::peers::{load, median, parse, succeed};
+use crate::peers::{load, median, parse, python, succeed};
 use crate::process::{cargo, flag};
 use crate::tree::root;
 
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     let seconds: f64 = flag(args, "--seconds").unwrap_or("3").parse().context("--seconds")?;
     let seconds = seconds.to_string();
     succeed(&mut cargo(&BUILD))?;
-    let python = python()?;
+    let python = python(&folder(), "requirements-regions.txt")?;
     let mut ours = DEVICES.map(|_| Vec::new());
     let mut peers = Vec::new();
     for round in 1..=rounds {
@@ -96,17 +96,6 @@ fn peer(python: &Path, seconds: &str) -> anyhow::Result<Value> {
 /// PyTorch is large: it has a virtual environment of its own.
 fn folder() -> PathBuf {
     root().join("target/peers-regions")
-}
-
-fn python() -> anyhow::Result<PathBuf> {
-    let python = folder().join("bin/python");
-    if !python.exists() {
-        succeed(Command::new("python3").args(["-m", "venv"]).arg(folder()))?;
-    }
-    let mut install = Command::new(&python);
-    install.args(["-m", "pip", "install", "--quiet", "--requirement"]);
-    succeed(install.arg(root().join("assets/peers/requirements-regions.txt")))?;
-    Ok(python)
 }
 
 #[cfg(test)]
