@@ -413,6 +413,9 @@ pub(crate) struct Baseline {
     /// Stop learning, or give up driving, after so many seconds of wall time [default: 2400].
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
+    /// Samples of one plan of rrt; a plan that takes more has failed.
+    #[arg(long, value_name = "N", default_value_t = 30_000)]
+    pub(crate) rrt_samples: usize,
     /// Environment steps that sac may learn from; unlike a time limit they give equal bytes.
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub(crate) max_env_steps: u64,

@@ -17,8 +17,6 @@ use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{Stopwatch, is_interrupted, spinner};
 use crate::report::{DecisionTimes, MapReport};
 
-/// Samples of one RRT plan: enough for 75 m; one that finds nothing has failed.
-const RRT_ITERATIONS: usize = 30_000;
 /// Wall time that the paper gives its baselines, seconds.
 const TIME_LIMIT_S: f64 = 2400.0;
 /// Longest crossing of a flat policy where no path tells, simulated seconds.
@@ -136,8 +134,8 @@ impl Bench<'_> {
         stopwatch.enter("plan");
         let planner = RoutePlanner::new(workspace);
         if args.method == Method::Rrt {
-            let settings =
-                RrtSettings { budget: Budget { iterations: RRT_ITERATIONS }, ..RrtSettings::default() };
+            let budget = Budget { iterations: args.rrt_samples };
+            let settings = RrtSettings { budget, ..RrtSettings::default() };
             let rrt = Rrt { workspace, planner: &planner, query: *query, settings, seed: *seed };
             return Ok(Some(self.drive(&rrt, stopwatch, stop)));
         }
