@@ -56,8 +56,7 @@ pub(crate) fn abstraction(
     let (heatmap, regions, source) = regions(workspace, &args.regions)?;
     stopwatch.enter("abstraction");
     let rbvd = diagram(workspace, &regions, args.metric)?;
-    let settings =
-        OptionSettings { endpoint_radius_m: workspace.robot.goal_tolerance_m, ..OptionSettings::default() };
+    let settings = option_settings(workspace);
     let file = AbstractionFile::new(map, source.clone(), args.options.into(), settings, rbvd);
     if let Some(path) = path {
         file.save(&path)?;
@@ -141,6 +140,11 @@ fn regions_from_file(workspace: &Workspace, file: &str) -> Result<Vec<Region>, F
         regions.extend(Region::new(RegionId(index as u32), around, field));
     }
     Ok(regions)
+}
+
+/// How options are made for the robot of `workspace`.
+pub(crate) fn option_settings(workspace: &Workspace) -> OptionSettings {
+    OptionSettings { endpoint_radius_m: workspace.robot.goal_tolerance_m, ..OptionSettings::default() }
 }
 
 /// How the diagram is built for the robot of `workspace`: half a cell is what distances may be wrong by.

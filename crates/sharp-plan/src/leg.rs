@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
 use sharp_options::{AllowedRule, Endpoint, EndpointId, OptionId, OptionSet};
 use sharp_rbvd::{Rbvd, StateId};
-use sharp_space::{Cell, OccupancyGrid, Point, Pose};
+use sharp_space::{Cell, GridFrame, OccupancyGrid, Point, Pose};
 
 /// What a leg is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -168,15 +168,7 @@ impl Leg {
         bytes.extend(frame.resolution_m.to_le_bytes());
         let center = self.target.center();
         bytes.extend([center.x, center.y].into_iter().flat_map(f64::to_le_bytes));
-        let positions = || self.guide.poses().iter().map(|pose| pose.position);
-        let least = |of: fn(Point) -> f64| positions().map(of).fold(f64::INFINITY, f64::min) - CORRIDOR_M;
-        let most = |of: fn(Point) -> f64| positions().map(of).fold(f64::NEG_INFINITY, f64::max) + CORRIDOR_M;
-        let inside = |point: Point| {
-            (least(|p| p.x)..=most(|p| p.x)).contains(&point.x)
-                && (least(|p| p.y)..=most(|p| p.y)).contains(&point.y)
-        };
-        let cells = (0..frame.height).flat_map(|row| (0..frame.width).map(move |col| Cell::new(col, row)));
-        for cell in cells.filter(|&cell| inside(frame.center(cell))) {
+        for cell in self.cells_around(frame) {
             let point = frame.center(cell);
             let is_source = self.source.as_ref().is_some_and(|source| source.contains(point, &self.rbvd));
             let allowed = self.rbvd.state_of(cell).map_or(2, |state| u8::from(self.allowed.contains(&state)));
@@ -184,6 +176,21 @@ impl Leg {
             bytes.push(grid.get(cell) as u8 | allowed << 2 | u8::from(is_source) << 4 | target << 5);
         }
         crate::files::hash(&bytes)
+    }
+
+    /// The cells of the rectangle around the guide, [`CORRIDOR_M`] wider on each side.
+    fn cells_around(&self, frame: &GridFrame) -> impl Iterator<Item = Cell> {
+        let reach = CORRIDOR_M / frame.resolution_m;
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for pose in self.guide.poses() {
+            let at = frame.to_grid(pose.position);
+            low = [low[0].min(at.x - reach), low[1].min(at.y - reach)];
+            high = [high[0].max(at.x + reach), high[1].max(at.y + reach)];
+        }
+        // Negative numbers become 0.
+        let range = |axis: usize, size: usize| low[axis] as usize..(high[axis].ceil() as usize).min(size);
+        let cols = range(0, frame.width);
+        range(1, frame.height).flat_map(move |row| cols.clone().map(move |col| Cell::new(col, row)))
     }
 
     /// Actions after which the leg counts as failed: ten, and three times what half speed needs.

@@ -171,9 +171,9 @@ impl PacedFollower {
 /// How freely a robot at `pose` may drive along its guide: 1 where room, bends and its own heading
 /// allow every speed, 0 where one of them forbids all haste.
 fn ease(workspace: &Workspace, pose: &Pose, tracker: &Tracker, view: &GuideView<'_>) -> f64 {
-    let steering = workspace.robot.can_turn_in_place();
+    let turns_in_place = workspace.robot.can_turn_in_place();
     let (room_m, turn_max_rad, error_max_rad, ahead_m) =
-        if steering { ([0.15, 0.6], 2.0, 0.5, 1.5) } else { ([0.1, 0.6], 1.6, 1.0, 0.75) };
+        if turns_in_place { ([0.15, 0.6], 2.0, 0.5, 1.5) } else { ([0.1, 0.6], 1.6, 1.0, 0.75) };
     let half_width_m = workspace.robot.footprint.inscribed_radius_m();
     let field = workspace.checker.field();
     let (mut least_m, mut turn_rad) = (f64::INFINITY, 0.0);

@@ -3,6 +3,7 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt;
 use sharp_space::Stream;
+use sharp_space::floorplan::turned_from;
 
 use crate::dataset::Sample;
 use crate::heatmap::HEADING_BINS;
@@ -52,7 +53,7 @@ impl Planes {
         let (image, labels) = (&sample.image, &sample.labels);
         let side = image.frame.width;
         assert_eq!(side, image.frame.height, "training maps are square");
-        let order: Vec<usize> = (0..side * side).map(|index| source_pixel(index, side, symmetry)).collect();
+        let order: Vec<usize> = (0..side * side).map(|index| turned_from(index, side, symmetry)).collect();
         let criticality = labels.criticality();
         self.images.extend(order.iter().map(|&i| image.blocked[i]));
         self.images.extend(order.iter().map(|&i| image.clearance[i]));
@@ -70,19 +71,4 @@ impl Planes {
         let headed = |(&i, &sum): (&usize, &f32)| criticality[i] >= CRITICAL_MIN && sum > 0.0;
         self.headed.extend(order.iter().zip(&sums).map(|pair| f32::from(u8::from(headed(pair)))));
     }
-}
-
-/// The pixel of the original that comes to `index` of the turned image.
-fn source_pixel(index: usize, side: usize, symmetry: usize) -> usize {
-    let (mut col, mut row) = (index % side, index / side);
-    if symmetry & 1 != 0 {
-        col = side - 1 - col;
-    }
-    if symmetry & 2 != 0 {
-        row = side - 1 - row;
-    }
-    if symmetry & 4 != 0 {
-        std::mem::swap(&mut col, &mut row);
-    }
-    row * side + col
 }

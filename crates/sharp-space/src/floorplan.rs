@@ -689,17 +689,11 @@ impl Plan {
     fn into_grid(self, symmetry: usize) -> OccupancyGrid {
         let side = self.side;
         let cells = (0..side * side).map(|index| {
-            let (mut col, mut row) = (index % side, index / side);
-            if symmetry & 1 != 0 {
-                col = side - 1 - col;
+            if self.blocked[turned_from(index, side, symmetry)] {
+                Occupancy::Occupied
+            } else {
+                Occupancy::Free
             }
-            if symmetry & 2 != 0 {
-                row = side - 1 - row;
-            }
-            if symmetry & 4 != 0 {
-                std::mem::swap(&mut col, &mut row);
-            }
-            if self.blocked[row * side + col] { Occupancy::Occupied } else { Occupancy::Free }
         });
         let origin = Pose::new(0.0, 0.0, 0.0);
         let frame = GridFrame { origin, resolution_m: self.resolution_m, width: side, height: side };
@@ -736,6 +730,23 @@ fn flood(frame: &GridFrame, open: &mut [bool], seed: Cell) -> usize {
         }
     }
     count
+}
+
+/// The cell of a square of `side` by `side` cells that comes to cell number `index` when the square is
+/// turned by one of its eight symmetries, 0 to 7.
+#[must_use]
+pub const fn turned_from(index: usize, side: usize, symmetry: usize) -> usize {
+    let (mut col, mut row) = (index % side, index / side);
+    if symmetry & 1 != 0 {
+        col = side - 1 - col;
+    }
+    if symmetry & 2 != 0 {
+        row = side - 1 - row;
+    }
+    if symmetry & 4 != 0 {
+        (col, row) = (row, col);
+    }
+    row * side + col
 }
 
 #[cfg(test)]

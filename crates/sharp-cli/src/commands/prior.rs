@@ -9,7 +9,7 @@ use std::time::Instant;
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
-use sharp_options::{OptionKind, OptionSet, OptionSettings};
+use sharp_options::{OptionKind, OptionSet};
 use sharp_plan::prior::{self, Course, CourseTask};
 use sharp_plan::{Abstraction, Follower, OptionPolicy, PacedFollower, Prior, Query, Workspace, write_atomic};
 use sharp_rl::{Progress, TrainSettings, TrainState, Trained, fine_tune, resume, train};
@@ -228,9 +228,7 @@ fn shrunk(grid: &OccupancyGrid) -> OccupancyGrid {
 fn abstraction(workspace: &Workspace, kind: OptionKind) -> Result<Abstraction, Failure> {
     let (_, regions, _) = pipeline::regions(workspace, "geometric")?;
     let rbvd = pipeline::diagram(workspace, &regions, crate::args::Metric::Geodesic)?;
-    let settings =
-        OptionSettings { endpoint_radius_m: workspace.robot.goal_tolerance_m, ..OptionSettings::default() };
-    let options = OptionSet::synthesize(&rbvd, kind, &settings);
+    let options = OptionSet::synthesize(&rbvd, kind, &pipeline::option_settings(workspace));
     Ok(Abstraction { rbvd: Arc::new(rbvd), options: Arc::new(options) })
 }
 

@@ -36,7 +36,8 @@ impl Run<'_> {
         let is_to_blame =
             |index: usize| is_weak(&on_arrival[index]) || on_arrival.get(index + 1).is_some_and(is_weak);
         let weak: Vec<usize> = (0..legs.len()).filter(|&index| is_to_blame(index)).collect();
-        let relearn = |&index: &usize| self.relearn(legs, index, &runs, (leg_wanted, round));
+        let relearn =
+            |&index: &usize| self.relearn(legs, (index, on_arrival[index]), &runs, (leg_wanted, round));
         let results: Vec<_> = weak.par_iter().map(relearn).collect();
         let mut better = false;
         for (index, learnt) in weak.into_iter().zip(results) {
@@ -49,12 +50,12 @@ impl Run<'_> {
         Ok(better)
     }
 
-    /// A policy for leg number `index` that holds more often than its present one on what `runs`
-    /// arrived with.
+    /// A policy for leg number `index`, which held as `on_arrival` says, that holds more often than its
+    /// present one on what `runs` arrived with.
     fn relearn(
         &self,
         legs: &[Arc<Leg>],
-        index: usize,
+        (index, on_arrival): (usize, Tally),
         runs: &[ChainRun],
         (wanted, round): (f64, u64),
     ) -> Option<Learnt> {
@@ -65,9 +66,7 @@ impl Run<'_> {
         let starts = self.starts(leg, seed).with_arrivals(arrivals);
         let mut settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
         // Training is for legs that are weak themselves, and once only.
-        let present =
-            Tally::count(runs.iter().filter(|run| run.entries.len() > index).map(|run| run.passed(index)));
-        if self.learnt[&leg.id].gradient_steps > 0 || present.rate() >= TRAIN_BELOW {
+        if self.learnt[&leg.id].gradient_steps > 0 || on_arrival.rate() >= TRAIN_BELOW {
             settings.train_below = 0.0;
         }
         let next = legs.get(index + 1);
