@@ -21,7 +21,7 @@ use crate::outcome::Failure;
 use crate::render::svg_to_png;
 
 pub(crate) use lines::{
-    BaselineLine, ResultLine, group, plan_folder, read_baselines, read_results, row_text,
+    BaselineLine, Machine, ResultLine, default_regions, problem_folder, read_baselines, row_text, variant,
 };
 pub(crate) use tables::table;
 
@@ -75,11 +75,10 @@ mod tests {
     use super::*;
 
     fn evaluate(lines: &[ResultLine], out: &Path) -> String {
-        let baseline = r#"{"method":"track","noise":"nominal","env":"<b>","robot":"limo","problem":1,
-            "report":{"episodes":20,"successes":18,"mean_sim_time_s":30.5}}"#;
+        let baseline = ResultLine { method: "track".into(), ..ResultLine::example("<b>", "limo", "none", 1) };
         let evaluation = Evaluation {
             lines: lines.iter().collect(),
-            baselines: vec![serde_json::from_str(baseline).expect("a line")],
+            baselines: vec![BaselineLine::from(&baseline)],
             command: "sharp eval \"quick\" --out <here>".into(),
             out,
         };
