@@ -1,12 +1,13 @@
 //! What a suite of problems came to: its lines, its tables, its figures and one page with all of them.
 //!
-//! Everything here is a function of `results.jsonl`, of the pictures beside the plans and, where given,
-//! of what `cargo xtask baselines` measured: equal results give equal bytes.
+//! Everything here is a function of `results.jsonl` and of the pictures beside the plans: equal results
+//! give equal bytes.
 
 mod calibration;
 mod figure;
 mod gallery;
 mod lines;
+mod methods;
 mod page;
 mod reuse;
 mod rows;
@@ -36,6 +37,14 @@ pub(crate) struct Evaluation<'a> {
     pub(crate) command: String,
     /// Where the plans of `lines` lie.
     pub(crate) out: &'a Path,
+}
+
+/// Writes `methods.md`, all methods under each noise, into `OUT/report`.
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub(crate) fn write_methods(lines: &[&ResultLine], out: &Path) -> Result<(), Failure> {
+    Ok(write_atomic(&out.join("report/methods.md"), methods::tables(lines).as_bytes())?)
 }
 
 /// Writes `tables.md`, every figure as SVG and PNG, and `index.html` into `OUT/report`; returns the
