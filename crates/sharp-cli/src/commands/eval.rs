@@ -31,6 +31,7 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
     }
     let merged = merge(&manifest)?;
     if is_interrupted() {
+        eprintln!("interrupted; the same call goes on with {} results", merged.lines().count());
         return Ok(Exit::Interrupted);
     }
     let page = write_report(&manifest, &merged, extra)?;
