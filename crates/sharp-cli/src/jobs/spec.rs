@@ -143,14 +143,15 @@ impl Spec {
     /// Processor time that the job is expected to take, seconds; for packing and order only.
     pub(crate) fn weight_s(&self) -> f64 {
         let is_large = ["e", "f", "g"].contains(&self.env.as_str());
-        // Means of the quick suite on one core (docs/scale.md).
-        let each_s = match (self.method, self.sharp.as_ref().map(|sharp| sharp.learning)) {
-            (Contender::Sharp, Some(Learning::Paper)) | (Contender::Sac, _) => self.time_limit_s,
-            (Contender::Sharp, _) => [9.0, 50.0][usize::from(is_large)],
-            (Contender::Rrt | Contender::RrtContact, _) => [1.0, 10.0][usize::from(is_large)],
-            (Contender::Track, _) => [1.0, 5.0][usize::from(is_large)],
-            (Contender::Mppi, _) => [3.0, 12.0][usize::from(is_large)],
+        // Measured on one core: docs/scale.md.
+        let [small_s, large_s] = match (self.method, self.sharp.as_ref().map(|sharp| sharp.learning)) {
+            (Contender::Sharp, Some(Learning::Paper)) | (Contender::Sac, _) => [self.time_limit_s; 2],
+            (Contender::Sharp, _) => [6.0, 50.0],
+            (Contender::Rrt | Contender::RrtContact, _) => [0.7, 15.0],
+            (Contender::Track, _) => [0.1, 0.5],
+            (Contender::Mppi, _) => [1.0, 4.0],
         };
+        let each_s: f64 = if is_large { large_s } else { small_s };
         each_s.min(self.time_limit_s) * self.problems.len() as f64
     }
 }
