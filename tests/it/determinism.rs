@@ -133,7 +133,7 @@ fn decisions(world: &World, guide: &GuidePath, policy: &OptionPolicy) -> Vec<[u6
         let on_guide = guide.pose_at(guide.length_m() * f64::from(index) / 50.0);
         let pose = Pose::at(on_guide.to_world(Vector::new(0.0, offset)), on_guide.heading);
         let tracker = Tracker::start(guide, &pose);
-        let percept = Percept::first(RobotState::at_rest(pose));
+        let percept = Percept::first(RobotState::at_rest(pose), &NoiseModel::nominal());
         let wanted = policy.decide(&world.workspace, &percept, &tracker, &view, &mut scratch);
         [wanted.reach_m, wanted.bearing_rad, wanted.speed_mps].map(f64::to_bits)
     };

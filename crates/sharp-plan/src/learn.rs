@@ -13,18 +13,18 @@ use sharp_space::{Pose, Seed};
 
 use crate::certify::{Certificate, Trial};
 use crate::leg::Leg;
+use crate::pace::PacedFollower;
 use crate::percept::{Expectation, Tracker, Workspace};
-use crate::policy::{Follower, Form, OptionPolicy, PacedFollower};
+use crate::policy::{Follower, Form, OptionPolicy};
 use crate::prior::{self, Prior};
 use crate::rollout::Driver;
 use crate::starts::Starts;
 use crate::stats::Tally;
 use crate::task::LegTask;
 
-/// Candidates that are left after a first look.
-const CONTENDERS: usize = 8;
-/// Candidates that are certified.
-const FINALISTS: usize = 3;
+/// Rounds in which candidates are compared: the share of [`LearnSettings::screening_episodes`] that each
+/// drives, and how many go on. Those that the last round leaves are certified.
+const ROUNDS: [(f64, usize); 3] = [(0.1, 10), (0.3, 5), (1.0, 3)];
 /// Reward of a contact while a prior is trained on: what it was trained with at full caution.
 const FINE_CONTACT: f64 = -20.0;
 
@@ -309,10 +309,8 @@ impl Lesson<'_> {
             Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
         left.extend(PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced));
         left.extend(Prior::shipped(robot).candidates(robot, self.noise));
-        let screening = self.settings.screening_episodes;
-        for (round, (episodes, keep)) in
-            [(screening.div_ceil(4), CONTENDERS), (screening, FINALISTS)].into_iter().enumerate()
-        {
+        for (round, (share, keep)) in ROUNDS.into_iter().enumerate() {
+            let episodes = (share * f64::from(self.settings.screening_episodes)).ceil() as u32;
             let trial = self.trial(episodes, "screen", round as u64);
             let cost_s = |policy: &OptionPolicy| trial.of_legs(&self.drivers(policy), &self.starts).cost_s();
             let mut costs: Vec<(f64, OptionPolicy)> =

@@ -269,15 +269,10 @@ impl Run<'_> {
     /// Repairs the plan of `legs` and counts how often it holds; `None` if stopped.
     fn verify(&mut self, legs: &[Arc<Leg>]) -> Result<Option<Solution>, FileError> {
         self.monitor.phase(Phase::Verify);
-        for round in 0..self.settings.repair_rounds {
-            if self.monitor.should_stop() {
-                return Ok(None);
-            }
-            if !self.repair(legs, u64::from(round))? {
-                break;
-            }
+        if self.settings.repair_rounds > 0 && !self.repair(legs)? {
+            return Ok(None);
         }
-        let runs = self.run_chain(legs, self.settings.verify_episodes, "verify", 0);
+        let runs = self.run_chain(&self.drivers(legs), self.settings.verify_episodes, "verify", 0);
         let on_arrival = tallies(&runs, legs.len());
         Ok(Some(self.solution(legs, &runs, &on_arrival)))
     }
@@ -306,10 +301,10 @@ impl Run<'_> {
         legs.iter().enumerate().map(driver).collect()
     }
 
-    fn run_chain(&self, legs: &[Arc<Leg>], episodes: u32, purpose: &str, index: u64) -> Vec<ChainRun> {
+    fn run_chain(&self, drivers: &[Driver<'_>], episodes: u32, purpose: &str, index: u64) -> Vec<ChainRun> {
         let seed = self.settings.seed.child(purpose, index);
         let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes, seed };
-        trial.of_chain(&self.drivers(legs), RobotState::at_rest(self.query.start))
+        trial.of_chain(drivers, RobotState::at_rest(self.query.start))
     }
 
     fn solution(&self, legs: &[Arc<Leg>], runs: &[ChainRun], on_arrival: &[Tally]) -> Solution {
@@ -319,16 +314,12 @@ impl Run<'_> {
             reused: self.before.contains(&leg.id),
             on_arrival,
         };
-        let succeeded: Vec<f64> = runs
-            .iter()
-            .filter(|run| run.outcome == LegOutcome::Done)
-            .map(|run| run.times_s.iter().sum())
-            .collect();
+        let Certificate { tally, mean_time_s } = certificate(runs);
         Solution {
             query: self.query,
             legs: legs.iter().zip(on_arrival).map(planned).collect(),
-            predicted: Tally::count(runs.iter().map(|run| run.outcome == LegOutcome::Done)),
-            predicted_time_s: succeeded.iter().sum::<f64>() / succeeded.len().max(1) as f64,
+            predicted: tally,
+            predicted_time_s: if mean_time_s.is_finite() { mean_time_s } else { 0.0 },
         }
     }
 
@@ -347,6 +338,11 @@ impl Run<'_> {
 /// The names of `legs`.
 fn ids(legs: &[Arc<Leg>]) -> Vec<LegId> {
     legs.iter().map(|leg| leg.id).collect()
+}
+
+/// How often all legs held, and how long that took.
+fn certificate(runs: &[ChainRun]) -> Certificate {
+    Certificate::of(runs.iter().map(|run| (run.outcome == LegOutcome::Done, run.times_s.iter().sum())))
 }
 
 /// For each leg: how often it was entered, and how often it then held.

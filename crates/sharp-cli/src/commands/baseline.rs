@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::{
-    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, Query,
-    RoutePlanner, Rrt, Sac, SacBudget, Tally, Track, TrackSettings, Workspace, compare,
+    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, PacedFollower,
+    Query, RoutePlanner, Rrt, Sac, SacBudget, Tally, Track, Workspace, compare,
 };
 use sharp_sim::NoiseModel;
 use sharp_space::Seed;
@@ -154,7 +154,7 @@ impl Bench<'_> {
                     planner: &planner,
                     query: *query,
                     route,
-                    settings: TrackSettings::new(robot, &noise),
+                    settings: PacedFollower::tuned(robot, &noise),
                     noise,
                 },
                 stopwatch,
