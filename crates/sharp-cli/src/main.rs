@@ -10,6 +10,7 @@ mod commands;
 mod evaluation;
 mod geojson;
 mod input;
+mod jobs;
 mod outcome;
 mod pictures;
 mod pipeline;
@@ -56,6 +57,7 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
         Command::Library(command) => commands::library::run(command, cli.json),
         Command::Baseline(args) => commands::baseline::run(args, cli.seed, cli.json),
         Command::Eval(args) => commands::eval::run(args, cli.seed, cli.json),
+        Command::Jobs(command) => commands::jobs::run(command, cli.seed, cli.json),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "sharp", &mut std::io::stdout());
             Ok(Exit::Done)

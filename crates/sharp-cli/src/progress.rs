@@ -86,14 +86,10 @@ pub(crate) struct SolveMonitor {
 }
 
 impl SolveMonitor {
-    pub(crate) fn new(stopwatch: Stopwatch, time_limit: Option<Duration>) -> Self {
+    /// Shows on `spinner` what the solver does.
+    pub(crate) fn new(stopwatch: Stopwatch, time_limit: Option<Duration>, spinner: ProgressBar) -> Self {
         let deadline = time_limit.and_then(|limit| stopwatch.begun.checked_add(limit));
-        Self {
-            stopwatch: Mutex::new(stopwatch),
-            spinner: spinner("searching"),
-            learnt: AtomicUsize::new(0),
-            deadline,
-        }
+        Self { stopwatch: Mutex::new(stopwatch), spinner, learnt: AtomicUsize::new(0), deadline }
     }
 
     fn watch(&self) -> MutexGuard<'_, Stopwatch> {

@@ -1,12 +1,13 @@
 //! What a suite of problems came to: its lines, its tables, its figures and one page with all of them.
 //!
-//! Everything here is a function of `results.jsonl`, of the pictures beside the plans and, where given,
-//! of what `cargo xtask baselines` measured: equal results give equal bytes.
+//! Everything here is a function of `results.jsonl` and of the pictures beside the plans: equal results
+//! give equal bytes.
 
 mod calibration;
 mod figure;
 mod gallery;
 mod lines;
+mod methods;
 mod page;
 mod reuse;
 mod rows;
@@ -21,8 +22,9 @@ use crate::outcome::Failure;
 use crate::render::svg_to_png;
 
 pub(crate) use lines::{
-    BaselineLine, ResultLine, group, plan_folder, read_baselines, read_results, row_text,
+    BaselineLine, Machine, ResultLine, default_regions, problem_folder, read_baselines, row_text, variant,
 };
+pub(crate) use methods::totals;
 pub(crate) use tables::table;
 
 /// What a report is made from.
@@ -36,6 +38,14 @@ pub(crate) struct Evaluation<'a> {
     pub(crate) command: String,
     /// Where the plans of `lines` lie.
     pub(crate) out: &'a Path,
+}
+
+/// Writes `methods.md`, all methods under each noise, into `OUT/report`.
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub(crate) fn write_methods(lines: &[&ResultLine], out: &Path) -> Result<(), Failure> {
+    Ok(write_atomic(&out.join("report/methods.md"), methods::tables(lines).as_bytes())?)
 }
 
 /// Writes `tables.md`, every figure as SVG and PNG, and `index.html` into `OUT/report`; returns the
@@ -75,11 +85,10 @@ mod tests {
     use super::*;
 
     fn evaluate(lines: &[ResultLine], out: &Path) -> String {
-        let baseline = r#"{"method":"track","noise":"nominal","env":"<b>","robot":"limo","problem":1,
-            "report":{"episodes":20,"successes":18,"mean_sim_time_s":30.5}}"#;
+        let baseline = ResultLine { method: "track".into(), ..ResultLine::example("<b>", "limo", "none", 1) };
         let evaluation = Evaluation {
             lines: lines.iter().collect(),
-            baselines: vec![serde_json::from_str(baseline).expect("a line")],
+            baselines: vec![BaselineLine::from(&baseline)],
             command: "sharp eval \"quick\" --out <here>".into(),
             out,
         };
