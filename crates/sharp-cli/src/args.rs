@@ -86,8 +86,22 @@ pub(crate) enum Kind {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Learning {
+    /// Followers and the shipped prior by their certificates; training where none holds.
     Fast,
+    /// The paper's protocol.
     Paper,
+    /// The shipped prior as it is, certified: what learning on the map is worth.
+    Prior,
+}
+
+impl Learning {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Paper => "paper",
+            Self::Prior => "prior",
+        }
+    }
 }
 
 /// What an abstraction is made of.
@@ -132,9 +146,12 @@ pub(crate) struct Solve {
     /// How policies are learnt.
     #[arg(long, value_enum, default_value_t = Learning::Fast)]
     pub(crate) learning: Learning,
-    /// none, nominal, harsh, biased or a noise file (.ron).
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
+    /// Whether measured costs of options flow back into the search, or A* keeps its first ones.
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    pub(crate) cost_update: Switch,
     /// How guides are planned: along the ridge of clearance, or by the paper's learn-and-link trees.
     #[arg(long, value_enum, default_value_t = Guide::Ridge)]
     pub(crate) guide: Guide,
@@ -162,7 +179,7 @@ pub(crate) struct Run {
     /// Number of executions.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) episodes: u32,
-    /// none, nominal, harsh, biased or a noise file [default: the plan's].
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file [default: the plan's].
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) noise: Option<String>,
     /// The simulator: walls to push and graze, walls that stop, or wheels and gravity in three
@@ -181,6 +198,15 @@ pub(crate) struct Run {
 pub(crate) enum Switch {
     On,
     Off,
+}
+
+impl Switch {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::On => "on",
+            Self::Off => "off",
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -312,7 +338,7 @@ pub(crate) struct PriorScore {
     /// husky, limo or a robot file (.ron).
     #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
     pub(crate) robot: String,
-    /// none, nominal, harsh, biased or a noise file (.ron).
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
     /// Number of generated maps.
@@ -400,7 +426,7 @@ pub(crate) struct Baseline {
     /// Number of executions.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) episodes: u32,
-    /// none, nominal, harsh, biased or a noise file (.ron).
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
     /// The simulator: walls to push and graze, walls that stop, or wheels and gravity in three
@@ -435,7 +461,7 @@ pub(crate) struct Eval {
     /// How policies are learnt.
     #[arg(long, value_enum, default_value_t = Learning::Fast)]
     pub(crate) learning: Learning,
-    /// none, nominal, harsh, biased or a noise file (.ron).
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
     /// Only these maps of the suite: names, separated by commas.

@@ -34,6 +34,8 @@ const FINE_CONTACT: f64 = -20.0;
 pub enum LearningMode {
     /// In the guide's frame: certified followers first, a learnt correction where none holds.
     Fast,
+    /// The prior at its middle caution, as it is: nothing to choose from and no training, to compare with.
+    Prior,
     /// The paper's protocol.
     Paper,
 }
@@ -62,10 +64,10 @@ impl LearnSettings {
     #[must_use]
     pub fn new(mode: LearningMode) -> Self {
         match mode {
-            LearningMode::Fast => Self {
+            LearningMode::Fast | LearningMode::Prior => Self {
                 mode,
                 wanted_success: 0.99,
-                train_below: 0.98,
+                train_below: if mode == LearningMode::Prior { 0.0 } else { 0.98 },
                 screening_episodes: 200,
                 certify_episodes: 1000,
                 environments: 16,
@@ -229,6 +231,7 @@ impl Lesson<'_> {
     ) -> Result<(Certificate, Learnt), LearnFailure> {
         match self.settings.mode {
             LearningMode::Fast => self.learn_fast(stop),
+            LearningMode::Prior => Ok(self.take_prior()),
             LearningMode::Paper => {
                 let learnt = self.learn_paper(stop)?;
                 let judged = Certificate { tally: learnt.verified, mean_time_s: learnt.mean_time_s };
@@ -299,6 +302,14 @@ impl Lesson<'_> {
             return Ok((anew, trained));
         }
         Ok((judged, self.learnt(policy, judged, (trained.env_steps, trained.gradient_steps))))
+    }
+
+    /// The prior as it was trained on other maps.
+    fn take_prior(&self) -> (Certificate, Learnt) {
+        let robot = &self.workspace.robot;
+        let policy = Prior::shipped(robot).policy(robot, self.noise);
+        let judged = self.judge(&policy);
+        (judged, self.learnt(policy, judged, (0, 0)))
     }
 
     /// What drives without learning: the few that cost least, each round on more episodes than the one

@@ -64,7 +64,8 @@ impl SolveSettings {
             search,
             noise,
             repair_episodes: 1000,
-            repair_rounds: if mode == LearningMode::Paper { 0 } else { 3 },
+            // Only where there is something to choose from can a leg choose again.
+            repair_rounds: if mode == LearningMode::Fast { 3 } else { 0 },
             wanted_success: 0.99,
             verify_episodes: 1000,
             // The paper keeps whatever was learnt.
@@ -370,6 +371,7 @@ mod tests {
 
     use super::*;
     use crate::drawn::{HALL, SEALED, along, world};
+    use crate::prior::Prior;
     use sharp_space::Pose;
 
     fn settings(workspace: &Workspace) -> SolveSettings {
@@ -413,6 +415,23 @@ mod tests {
         let phases = notes.phases.into_inner().expect("no other panic");
         assert_eq!((phases.first(), phases.last()), (Some(&Phase::Search), Some(&Phase::Done)), "{phases:?}");
         assert!(notes.learnt.into_inner().expect("no other panic").len() >= 4, "every leg was told");
+    }
+
+    #[test]
+    fn the_prior_alone_is_certified_and_neither_trained_nor_repaired() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let prior = SolveSettings::new(&workspace, LearningMode::Prior, NoiseModel::nominal(), Seed(1));
+        let learn = LearnSettings { certify_episodes: 100, ..prior.learn };
+        let settings = SolveSettings { learn, verify_episodes: 100, ..prior };
+        let mut library = OptionLibrary::in_memory();
+        let outcome = solve(&workspace, &abstraction, along(), &settings, &mut library, &());
+        let Ok(Outcome::Solved(solution)) = outcome else { panic!("{outcome:?}") };
+        let policy = Prior::shipped(&workspace.robot).policy(&workspace.robot, &NoiseModel::nominal());
+        for PlannedLeg { leg, learnt, .. } in &solution.legs {
+            assert_eq!(learnt.policy, policy, "{}", leg.id);
+            assert_eq!((learnt.verified.episodes, learnt.gradient_steps), (100, 0), "{}", leg.id);
+        }
+        assert!(solution.predicted.rate() > 0.8, "an open hall holds {:?}", solution.predicted);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use sharp_plan::{RunSettings, run as run_plan, write_atomic};
 use sharp_space::Seed;
 
-use crate::args::{AbstractionArgs, Eval, Guide, Kind, Learning, MapArgs, Metric, Solve, Suite, Unknown};
+use crate::args::{AbstractionArgs, Eval, Guide, Kind, MapArgs, Metric, Solve, Suite, Switch, Unknown};
 use crate::commands::solve::{Solved, solve_problem};
 use crate::evaluation::{
     self, BaselineLine, Evaluation, ResultLine, group, plan_folder, read_baselines, read_results, row_text,
@@ -83,7 +83,7 @@ fn command(args: &Eval, seed: u64) -> String {
         "sharp --seed {seed} eval {} --episodes {} --learning {} --noise {} --regions {}",
         name(args.suite.to_possible_value()),
         args.episodes,
-        learning_name(args.learning),
+        args.learning.name(),
         args.noise,
         args.regions
     );
@@ -155,22 +155,15 @@ fn is_result_of(line: &ResultLine, case: &Case, args: &Eval, seed: u64) -> bool 
         && line.options == sharp_plan::kind_name(case.kind.into())
         && line.regions == args.regions
         && line.noise == args.noise
-        && line.learning == learning_name(args.learning)
+        && line.learning == args.learning.name()
         && line.seed == seed
         && line.episodes == args.episodes
-}
-
-const fn learning_name(learning: Learning) -> &'static str {
-    match learning {
-        Learning::Fast => "fast",
-        Learning::Paper => "paper",
-    }
 }
 
 /// Solves and runs one case; `None` if it was interrupted.
 fn evaluate(case: &Case, args: &Eval, seed: u64) -> Result<Option<ResultLine>, Failure> {
     let kind = sharp_plan::kind_name(case.kind.into());
-    let group = group(&case.env, case.robot, kind, learning_name(args.learning), seed, &args.regions);
+    let group = group(&case.env, case.robot, kind, args.learning.name(), seed, &args.regions);
     let folder = plan_folder(&args.out, &group, case.problem);
     let solve = solve_args(case, args, args.out.join("library").join(&group), folder.clone());
     let Solved { report, plan } = solve_problem(&solve, seed)?;
@@ -224,6 +217,7 @@ fn solve_args(case: &Case, args: &Eval, library: PathBuf, out: PathBuf) -> Solve
         problem: Some(case.problem),
         learning: args.learning,
         noise: args.noise.clone(),
+        cost_update: Switch::On,
         guide: Guide::Ridge,
         library: Some(library.display().to_string()),
         out: Some(out),

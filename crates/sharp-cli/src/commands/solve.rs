@@ -10,7 +10,7 @@ use sharp_plan::{
 };
 use sharp_space::Seed;
 
-use crate::args::{Guide, Learning, Solve};
+use crate::args::{Guide, Learning, Solve, Switch};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::pipeline::{self, Built};
 use crate::progress::{SolveMonitor, Stopwatch, is_interrupted};
@@ -22,6 +22,7 @@ impl From<Learning> for LearningMode {
         match learning {
             Learning::Fast => Self::Fast,
             Learning::Paper => Self::Paper,
+            Learning::Prior => Self::Prior,
         }
     }
 }
@@ -64,6 +65,7 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64) -> Result<Solved, Failure> 
     let built = pipeline::abstraction(&workspace, &args.abstraction, cache.as_deref(), &mut stopwatch)?;
     let abstraction = built.file.abstraction();
     let mut settings = SolveSettings::new(&workspace, args.learning.into(), noise.clone(), Seed(seed));
+    settings.search.cost_update = args.cost_update == Switch::On;
     if args.guide == Guide::Paper {
         settings.search.guide.planner = GuidePlanner::LearnAndLink;
     }
@@ -77,6 +79,7 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64) -> Result<Solved, Failure> 
         abstraction: abstraction.clone(),
         noise: noise.clone(),
         learning: args.learning.into(),
+        cost_update: args.cost_update == Switch::On,
         seed: Seed(seed),
         solution,
     };
@@ -125,10 +128,8 @@ fn blank_report(
         reason: None,
         robot: workspace.robot.name.clone(),
         options: sharp_plan::kind_name(built.file.kind),
-        learning: match args.learning {
-            Learning::Fast => "fast",
-            Learning::Paper => "paper",
-        },
+        learning: args.learning.name(),
+        cost_update: args.cost_update.name(),
         noise: args.noise.clone(),
         seed,
         map: MapReport::new(&map.name, &map.grid),
@@ -182,13 +183,14 @@ fn write_plan(
 
 fn print_report(report: &SolveReport) {
     say!(
-        "{}: {} on map {}, {} options, {} noise, {} learning",
+        "{}: {} on map {}, {} options, {} noise, {} learning{}",
         report.status,
         report.robot,
         report.map.name,
         report.options,
         report.noise,
-        report.learning
+        report.learning,
+        if report.cost_update == Switch::Off.name() { ", no cost update" } else { "" }
     );
     say!(
         "{} abstract states (regions: {}), {} options",

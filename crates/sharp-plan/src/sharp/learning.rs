@@ -29,8 +29,8 @@ impl Run<'_> {
         let missing: Vec<Arc<Leg>> = legs.iter().filter(is_missing).cloned().collect();
         self.monitor.phase(Phase::Learn(missing.len()));
         match self.settings.learn.mode {
-            LearningMode::Fast if missing.is_empty() => Ok(true),
-            LearningMode::Fast => self.learn_in_order(legs),
+            LearningMode::Fast | LearningMode::Prior if missing.is_empty() => Ok(true),
+            LearningMode::Fast | LearningMode::Prior => self.learn_in_order(legs),
             LearningMode::Paper => self.learn_apart(&missing),
         }
     }
