@@ -164,6 +164,9 @@ pub(crate) struct Solve {
     /// Stop after so many seconds of wall time; what was learnt is kept.
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
+    /// Write learning curves for TensorBoard there, one run a leg that is trained [default: none].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) tensorboard: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -331,6 +334,9 @@ pub(crate) struct PriorTrain {
     /// Begin with the networks of this prior instead of fresh ones.
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,
+    /// Write learning curves for TensorBoard there, as one run [default: none].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) tensorboard: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -445,6 +451,9 @@ pub(crate) struct Baseline {
     /// Environment steps that sac may learn from; unlike a time limit they give equal bytes.
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub(crate) max_env_steps: u64,
+    /// Write learning curves for TensorBoard there, of sac [default: none].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) tensorboard: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

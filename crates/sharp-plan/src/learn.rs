@@ -135,6 +135,20 @@ pub enum LearnFailure {
     Broken(TrainError),
 }
 
+/// Watches a lesson and may stop it; a closure that says whether to stop watches nothing else.
+pub trait LessonMonitor: Sync {
+    /// Asked now and then; true gives the lesson up.
+    fn should_stop(&self) -> bool;
+    /// A training took a step.
+    fn trained(&self, _progress: &Progress<'_>) {}
+}
+
+impl<F: Fn() -> bool + Sync> LessonMonitor for F {
+    fn should_stop(&self) -> bool {
+        self()
+    }
+}
+
 /// Which pseudo-reward teaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RewardMode {
@@ -215,25 +229,25 @@ pub struct Lesson<'a> {
 }
 
 impl Lesson<'_> {
-    /// Learns a policy; `stop` is asked now and then whether to give up.
+    /// Learns a policy; `monitor` may give it up.
     ///
     /// # Errors
     /// Says whether it was stopped or what broke. A policy that merely falls short is returned with
     /// its certificate: the planner decides what it is worth.
-    pub fn learn(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
-        self.learn_judged(stop).map(|(_, learnt)| learnt)
+    pub fn learn(&self, monitor: &dyn LessonMonitor) -> Result<Learnt, LearnFailure> {
+        self.learn_judged(monitor).map(|(_, learnt)| learnt)
     }
 
     /// The same, with what [`judge`](Self::judge) says of it.
     pub(crate) fn learn_judged(
         &self,
-        stop: &(dyn Fn() -> bool + Sync),
+        monitor: &dyn LessonMonitor,
     ) -> Result<(Certificate, Learnt), LearnFailure> {
         match self.settings.mode {
-            LearningMode::Fast => self.learn_fast(stop),
+            LearningMode::Fast => self.learn_fast(monitor),
             LearningMode::Prior => Ok(self.take_prior()),
             LearningMode::Paper => {
-                let learnt = self.learn_paper(stop)?;
+                let learnt = self.learn_paper(monitor)?;
                 let judged = Certificate { tally: learnt.verified, mean_time_s: learnt.mean_time_s };
                 Ok((judged, learnt))
             }
@@ -277,10 +291,10 @@ impl Lesson<'_> {
 
     /// The cheapest policy at hand that holds as wanted; where none does, the one that holds most
     /// often, or what the prior learns on this leg.
-    fn learn_fast(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<(Certificate, Learnt), LearnFailure> {
+    fn learn_fast(&self, monitor: &dyn LessonMonitor) -> Result<(Certificate, Learnt), LearnFailure> {
         let mut best: Option<(Certificate, OptionPolicy)> = None;
         for policy in self.screen() {
-            if stop() {
+            if monitor.should_stop() {
                 return Err(LearnFailure::Stopped);
             }
             let judged = self.judge(&policy);
@@ -295,7 +309,7 @@ impl Lesson<'_> {
         if judged.tally.rate() >= self.settings.train_below {
             return Ok((judged, self.learnt(policy, judged, (0, 0))));
         }
-        let trained = self.train_on(stop)?;
+        let trained = self.train_on(monitor)?;
         let alone = Certificate { tally: trained.verified, mean_time_s: trained.mean_time_s };
         let anew = if self.tail.is_empty() { alone } else { self.judge(&trained.policy) };
         if anew.tally.successes > judged.tally.successes {
@@ -335,17 +349,17 @@ impl Lesson<'_> {
     }
 
     /// The prior, trained further on this leg alone.
-    fn train_on(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+    fn train_on(&self, monitor: &dyn LessonMonitor) -> Result<Learnt, LearnFailure> {
         let robot = &self.workspace.robot;
         let form = prior::form(robot, Expectation::new(self.noise, 1.0));
         let reward = ShapedReward { contact: FINE_CONTACT, ..ShapedReward::default() };
         let networks = Prior::shipped(robot).networks();
-        self.learn_sac(form, RewardMode::Shaped(reward), Some(networks), stop)
+        self.learn_sac(form, RewardMode::Shaped(reward), Some(networks), monitor)
     }
 
-    fn learn_paper(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+    fn learn_paper(&self, monitor: &dyn LessonMonitor) -> Result<Learnt, LearnFailure> {
         let form = Form::Absolute { reach_m: self.workspace.robot.waypoint_reach_m };
-        self.learn_sac(form, RewardMode::Paper(PseudoReward::default()), None, stop)
+        self.learn_sac(form, RewardMode::Paper(PseudoReward::default()), None, monitor)
     }
 
     fn learn_sac(
@@ -353,7 +367,7 @@ impl Lesson<'_> {
         form: Form,
         reward: RewardMode,
         networks: Option<&SacState>,
-        stop: &(dyn Fn() -> bool + Sync),
+        monitor: &dyn LessonMonitor,
     ) -> Result<Learnt, LearnFailure> {
         let task = |index| {
             let starts = Arc::clone(&self.starts);
@@ -362,8 +376,9 @@ impl Lesson<'_> {
             LegTask::new(self.workspace, legs, form, reward, starts, noise)
         };
         let mut tasks: Vec<LegTask> = (0..self.settings.environments).map(task).collect();
-        let mut observer = |_: &Progress<'_>| {
-            if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let mut observer = |progress: &Progress<'_>| {
+            monitor.trained(progress);
+            if monitor.should_stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let mut rng = self.seed.stream("sac", 0);
         let settings = &self.settings.train;
@@ -372,7 +387,7 @@ impl Lesson<'_> {
             None => train(&mut tasks, settings, &mut rng, &mut observer),
         };
         let trained = trained.map_err(LearnFailure::Broken)?;
-        if stop() {
+        if monitor.should_stop() {
             return Err(LearnFailure::Stopped);
         }
         let policy = OptionPolicy::Learnt { form, actor: Box::new(trained.actor) };

@@ -7,12 +7,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use sharp_options::OptionKind;
+use sharp_rl::Progress;
 use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Seed;
 
 use crate::certify::{Certificate, Trial};
 use crate::files::FileError;
-use crate::learn::{LearnSettings, LearningMode, Learnt, Lesson};
+use crate::learn::{LearnSettings, LearningMode, Learnt, Lesson, LessonMonitor};
 use crate::leg::{Leg, LegId, Role};
 use crate::library::OptionLibrary;
 use crate::percept::Workspace;
@@ -94,6 +95,8 @@ pub enum Phase {
 pub trait Monitor: Sync {
     /// A phase begins.
     fn phase(&self, _phase: Phase) {}
+    /// The training of a leg took a step; several legs may train at once.
+    fn trained(&self, _leg: &Leg, _progress: &Progress<'_>) {}
     /// A leg was learnt.
     fn learnt(&self, _leg: &Leg, _learnt: &Learnt) {}
     /// Asked often; true ends the search as soon as possible. What was learnt is kept.
@@ -103,6 +106,22 @@ pub trait Monitor: Sync {
 }
 
 impl Monitor for () {}
+
+/// A monitor, on one leg.
+struct LegMonitor<'a> {
+    monitor: &'a dyn Monitor,
+    leg: &'a Leg,
+}
+
+impl LessonMonitor for LegMonitor<'_> {
+    fn should_stop(&self) -> bool {
+        self.monitor.should_stop()
+    }
+
+    fn trained(&self, progress: &Progress<'_>) {
+        self.monitor.trained(self.leg, progress);
+    }
+}
 
 /// A leg of a solution.
 #[derive(Clone, Debug)]
@@ -371,7 +390,9 @@ mod tests {
 
     use super::*;
     use crate::drawn::{HALL, SEALED, along, world};
-    use crate::prior::Prior;
+    use crate::percept::Expectation;
+    use crate::policy::OptionPolicy;
+    use crate::prior;
     use sharp_space::Pose;
 
     fn settings(workspace: &Workspace) -> SolveSettings {
@@ -426,9 +447,10 @@ mod tests {
         let mut library = OptionLibrary::in_memory();
         let outcome = solve(&workspace, &abstraction, along(), &settings, &mut library, &());
         let Ok(Outcome::Solved(solution)) = outcome else { panic!("{outcome:?}") };
-        let policy = Prior::shipped(&workspace.robot).policy(&workspace.robot, &NoiseModel::nominal());
+        let middle = prior::form(&workspace.robot, Expectation::new(&NoiseModel::nominal(), 0.5));
         for PlannedLeg { leg, learnt, .. } in &solution.legs {
-            assert_eq!(learnt.policy, policy, "{}", leg.id);
+            let OptionPolicy::Learnt { form, .. } = learnt.policy else { panic!("{}: a follower", leg.id) };
+            assert_eq!(form, middle, "{}", leg.id);
             assert_eq!((learnt.verified.episodes, learnt.gradient_steps), (100, 0), "{}", leg.id);
         }
         assert!(solution.predicted.rate() > 0.8, "an open hall holds {:?}", solution.predicted);

@@ -222,6 +222,7 @@ fn solve_args(case: &Case, args: &Eval, library: PathBuf, out: PathBuf) -> Solve
         library: Some(library.display().to_string()),
         out: Some(out),
         time_limit: Some(2400.0),
+        tensorboard: None,
     }
 }
 

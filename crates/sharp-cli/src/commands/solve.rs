@@ -69,7 +69,7 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64) -> Result<Solved, Failure> 
     if args.guide == Guide::Paper {
         settings.search.guide.planner = GuidePlanner::LearnAndLink;
     }
-    let monitor = SolveMonitor::new(stopwatch, time_limit);
+    let monitor = SolveMonitor::new(stopwatch, time_limit, args.tensorboard.as_deref());
     let outcome = solve(&workspace, &abstraction, query, &settings, &mut library, &monitor)?;
     let stopwatch = monitor.into_stopwatch();
 
