@@ -53,24 +53,24 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
     let wanted: Vec<&ResultLine> =
         lines.iter().filter(|line| cases.iter().any(|case| is_result_of(line, case, args, seed))).collect();
     let command = command(args, seed);
-    let evaluation = Evaluation { lines: wanted, baselines, command, out: &args.out };
-    let page = evaluation::write(&evaluation)?;
+    let rivals: Vec<ResultLine> = baselines.iter().map(ResultLine::from).collect();
+    let all = lines.iter().chain(&rivals).collect();
+    let page = evaluation::write(&Evaluation { lines: all, command, out: &args.out })?;
     if json {
-        for line in evaluation.lines {
+        for line in wanted {
             say!("{}", to_json(line));
         }
     } else {
-        say!("{}", evaluation::table(&evaluation.lines));
+        say!("{}", evaluation::table(&wanted));
         say!("results in {}, pictures of every plan in {}", path.display(), args.out.join("plans").display());
         say!("report in {}", page.display());
     }
     Ok(Exit::Done)
 }
 
-/// The baselines under the noise of this evaluation.
+/// The baselines that were measured elsewhere.
 fn baselines(args: &Eval) -> Result<Vec<BaselineLine>, Failure> {
-    let lines = args.baselines.as_deref().map(read_baselines).transpose()?.unwrap_or_default();
-    Ok(lines.into_iter().filter(|line| line.noise == args.noise).collect())
+    Ok(args.baselines.as_deref().map(read_baselines).transpose()?.unwrap_or_default())
 }
 
 /// The call that gives the same results, with everything that decides them.
@@ -183,6 +183,7 @@ fn evaluate(case: &Case, args: &Eval, seed: u64) -> Result<Option<ResultLine>, F
         regions: args.regions.clone(),
         options_available: report.options_available,
         noise: args.noise.clone(),
+        variant: "default".to_owned(),
         trial: 0,
         seed,
         status: report.status.to_owned(),

@@ -26,6 +26,9 @@ pub(crate) struct ResultLine {
     #[serde(default)]
     pub(crate) options_available: usize,
     pub(crate) noise: String,
+    /// What was switched off: default, no_recovery, no_cost_update or both with a plus between.
+    #[serde(default = "default_variant")]
+    pub(crate) variant: String,
     pub(crate) trial: u32,
     pub(crate) seed: u64,
     pub(crate) status: String,
@@ -47,6 +50,10 @@ pub(crate) fn default_regions() -> String {
     "net".to_owned()
 }
 
+fn default_variant() -> String {
+    "default".to_owned()
+}
+
 impl ResultLine {
     pub(crate) const fn tally(&self) -> Tally {
         Tally { episodes: self.episodes, successes: self.successes }
@@ -54,6 +61,10 @@ impl ResultLine {
 
     pub(crate) fn is_solved(&self) -> bool {
         self.status == "solved"
+    }
+
+    pub(crate) fn is_of_sharp(&self) -> bool {
+        self.method == "sharp"
     }
 
     /// Name of the library that the problem shared with others.
@@ -96,6 +107,53 @@ pub(crate) struct BaselineCounts {
     pub(crate) successes: u32,
     /// Simulated seconds of successful executions, mean; 0 without any.
     pub(crate) mean_sim_time_s: f64,
+    #[serde(default)]
+    pub(crate) env_steps: u64,
+    #[serde(default)]
+    pub(crate) time_s: BaselineTimes,
+}
+
+/// Wall time of a baseline, seconds.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+pub(crate) struct BaselineTimes {
+    pub(crate) plan: f64,
+    pub(crate) learn: f64,
+}
+
+impl From<&BaselineLine> for ResultLine {
+    fn from(line: &BaselineLine) -> Self {
+        let BaselineLine { method, noise, env, robot, problem, report } = line;
+        let time_s =
+            SolveTimes { plan: report.time_s.plan, learn: report.time_s.learn, ..SolveTimes::default() };
+        Self {
+            schema: "sharp.result/1".to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            method: method.clone(),
+            learning: "none".to_owned(),
+            env: env.clone(),
+            problem: *problem,
+            robot: robot.clone(),
+            options: "none".to_owned(),
+            regions: default_regions(),
+            options_available: 0,
+            noise: noise.clone(),
+            variant: default_variant(),
+            trial: 0,
+            seed: 1,
+            status: "driven".to_owned(),
+            episodes: report.episodes,
+            successes: report.successes,
+            collisions: 0,
+            timeouts: 0,
+            recoveries: 0,
+            mean_sim_time_s: report.mean_sim_time_s,
+            predicted_success: 0.0,
+            reuse: Reuse { uses: 0, reused: 0 },
+            env_steps: report.env_steps,
+            gradient_steps: 0,
+            time_s,
+        }
+    }
 }
 
 /// The results that an earlier run left; none if there was none.
@@ -170,6 +228,7 @@ impl ResultLine {
             recoveries: 0,
             mean_sim_time_s: 25.0,
             predicted_success: 0.98,
+            variant: default_variant(),
             reuse: Reuse { uses: 4, reused: 1 },
             env_steps: 0,
             gradient_steps: 0,

@@ -1,8 +1,31 @@
-//! The results as a Markdown table.
+//! The results as Markdown tables.
 
 use std::fmt::Write;
 
+use super::cases::Results;
+use super::figure::{Figure, Table};
 use super::lines::ResultLine;
+
+/// The numbers of every figure, and one row for every result of SHARP in the setting of the page.
+pub(super) fn document(results: &Results<'_>, figures: &[Figure]) -> String {
+    let mut text = String::from("# SHARP evaluation\n");
+    for Figure { name, title, caption, table, .. } in figures {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "\n## {title}\n\n{caption} ([figure]({name}.svg))\n\n{}", markdown(table));
+    }
+    text + "\n## Every result\n\n" + &table(&results.sharp(results.main))
+}
+
+fn markdown(table: &Table) -> String {
+    let row = |cells: &mut dyn Iterator<Item = &str>| {
+        let cells: Vec<String> = cells.map(|cell| cell.replace('|', "\\|")).collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    let mut text = row(&mut table.columns.iter().copied());
+    text += &row(&mut table.columns.iter().map(|_| "---"));
+    text.extend(table.rows.iter().map(|cells| row(&mut cells.iter().map(String::as_str))));
+    text
+}
 
 /// One row a result.
 pub(crate) fn table(lines: &[&ResultLine]) -> String {
