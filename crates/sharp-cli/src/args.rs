@@ -1,8 +1,13 @@
 //! What a user may type: one definition feeds parsing and help.
 
+mod suites;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use serde::{Deserialize, Serialize};
+
+pub(crate) use suites::{Contender, Engine, Eval, Jobs, Selection, Submit, Suite};
 
 /// From a map to a policy that knows its odds: option learning for stochastic path planning.
 #[derive(Debug, Parser)]
@@ -47,6 +52,9 @@ pub(crate) enum Command {
     Baseline(Baseline),
     /// Run a suite of problems and write results and tables.
     Eval(Eval),
+    /// The jobs under `eval`, for clusters: plan, run, merge, submit.
+    #[command(subcommand)]
+    Jobs(Jobs),
     /// Print a completion script for a shell.
     Completions {
         /// The shell.
@@ -78,13 +86,15 @@ pub(crate) enum Unknown {
 }
 
 /// The kind of option.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub(crate) enum Kind {
     Centroid,
     Interface,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub(crate) enum Learning {
     /// Followers and the shipped prior by their certificates; training where none holds.
     Fast,
@@ -197,7 +207,8 @@ pub(crate) struct Run {
     pub(crate) collisions: Collisions,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub(crate) enum Switch {
     On,
     Off,
@@ -454,50 +465,4 @@ pub(crate) struct Baseline {
     /// Write learning curves for TensorBoard there, of sac [default: none].
     #[arg(long, value_name = "DIR")]
     pub(crate) tensorboard: Option<PathBuf>,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct Eval {
-    /// Which suite.
-    #[arg(value_enum, default_value_t = Suite::Smoke)]
-    pub(crate) suite: Suite,
-    /// Where results are written; a run that was stopped goes on where it was.
-    #[arg(long, value_name = "DIR", default_value = "out/eval")]
-    pub(crate) out: PathBuf,
-    /// Executions of each plan.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub(crate) episodes: u32,
-    /// How policies are learnt.
-    #[arg(long, value_enum, default_value_t = Learning::Fast)]
-    pub(crate) learning: Learning,
-    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
-    #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
-    pub(crate) noise: String,
-    /// Only these maps of the suite: names, separated by commas.
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    pub(crate) envs: Vec<String>,
-    /// Only these robots of the suite: names, separated by commas.
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    pub(crate) robots: Vec<String>,
-    /// Only this kind of option.
-    #[arg(long, value_enum)]
-    pub(crate) options: Option<Kind>,
-    /// Where critical regions come from.
-    #[arg(long, default_value = "net", value_name = "net|geometric|random|grid")]
-    pub(crate) regions: String,
-    /// Only these problems of each map: numbers from 1, separated by commas.
-    #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
-    pub(crate) problems: Vec<usize>,
-    /// What `cargo xtask baselines` measured, for the figures; those under other noise are left out.
-    #[arg(long, value_name = "FILE.jsonl")]
-    pub(crate) baselines: Option<PathBuf>,
-}
-
-/// Suites of problems.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Suite {
-    /// Environment a, Husky, both kinds of option.
-    Smoke,
-    /// Every named environment, both robots, both kinds of option.
-    Quick,
 }

@@ -11,6 +11,7 @@ mod curves;
 mod evaluation;
 mod geojson;
 mod input;
+mod jobs;
 mod outcome;
 mod pictures;
 mod pipeline;
@@ -57,6 +58,7 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
         Command::Library(command) => commands::library::run(command, cli.json),
         Command::Baseline(args) => commands::baseline::run(args, cli.seed, cli.json),
         Command::Eval(args) => commands::eval::run(args, cli.seed, cli.json),
+        Command::Jobs(command) => commands::jobs::run(command, cli.seed, cli.json),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "sharp", &mut std::io::stdout());
             Ok(Exit::Done)

@@ -16,6 +16,10 @@ pub(crate) enum Exit {
     No = 1,
     /// Broken input or use.
     Broken = 2,
+    /// Some jobs of many failed or are missing.
+    Partial = 3,
+    /// Interrupted on a cluster that starts the job again at this code.
+    Requeue = 75,
     /// Interrupted, after saving what there was.
     Interrupted = 130,
 }
@@ -53,6 +57,11 @@ struct ErrorBody<'a> {
 impl Failure {
     pub(crate) fn new(code: &'static str, message: impl fmt::Display) -> Self {
         Self { code, message: message.to_string() }
+    }
+
+    /// The same, told with where it happened.
+    pub(crate) fn within(self, place: impl fmt::Display) -> Self {
+        Self { message: format!("{place}: {}", self.message), ..self }
     }
 
     /// The error object of `--json`.

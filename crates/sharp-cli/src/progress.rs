@@ -91,12 +91,17 @@ pub(crate) struct SolveMonitor {
 }
 
 impl SolveMonitor {
-    /// `curves` is the folder of learning curves, if they are wanted.
-    pub(crate) fn new(stopwatch: Stopwatch, time_limit: Option<Duration>, curves: Option<&Path>) -> Self {
+    /// Shows on `spinner` what the solver does; `curves` is the folder of learning curves, if they are wanted.
+    pub(crate) fn new(
+        stopwatch: Stopwatch,
+        time_limit: Option<Duration>,
+        spinner: ProgressBar,
+        curves: Option<&Path>,
+    ) -> Self {
         let deadline = time_limit.and_then(|limit| stopwatch.begun.checked_add(limit));
         Self {
             stopwatch: Mutex::new(stopwatch),
-            spinner: spinner("searching"),
+            spinner,
             learnt: AtomicUsize::new(0),
             deadline,
             curves: curves.map(|folder| Mutex::new(CurveFolder::new(folder))),

@@ -180,7 +180,8 @@ impl SolveReport {
     }
 }
 
-#[derive(Debug, Serialize)]
+/// Wall time of one decision, microseconds.
+#[derive(Clone, Copy, Debug, Default, Serialize, serde::Deserialize)]
 pub(crate) struct DecisionTimes {
     pub(crate) p50: f64,
     pub(crate) p99: f64,

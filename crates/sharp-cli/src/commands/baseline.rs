@@ -28,40 +28,40 @@ const HORIZON_S: f64 = 300.0;
 /// Wall time by phase, seconds. `plan` and `learn` are what one execution needs before and while it
 /// drives; `drive` is what simulating all of them took, their planning included.
 #[derive(Clone, Copy, Debug, Serialize)]
-struct BaselineTimes {
-    load: f64,
-    plan: f64,
-    learn: f64,
-    drive: f64,
-    total: f64,
+pub(crate) struct BaselineTimes {
+    pub(crate) load: f64,
+    pub(crate) plan: f64,
+    pub(crate) learn: f64,
+    pub(crate) drive: f64,
+    pub(crate) total: f64,
 }
 
 /// `sharp.baseline/1`.
 #[derive(Debug, Serialize)]
-struct BaselineReport {
-    schema: &'static str,
-    method: &'static str,
-    status: &'static str,
-    robot: String,
-    noise: String,
-    simulator: String,
-    seed: u64,
-    map: MapReport,
-    episodes: u32,
-    successes: u32,
-    success_rate: f64,
-    lower95: f64,
-    upper95: f64,
-    collisions: u32,
-    timeouts: u32,
-    strays: u32,
-    recoveries: u32,
-    mean_sim_time_s: f64,
-    mean_path_m: f64,
-    env_steps: u64,
-    gradient_steps: u64,
-    decision_us: DecisionTimes,
-    time_s: BaselineTimes,
+pub(crate) struct BaselineReport {
+    pub(crate) schema: &'static str,
+    pub(crate) method: &'static str,
+    pub(crate) status: &'static str,
+    pub(crate) robot: String,
+    pub(crate) noise: String,
+    pub(crate) simulator: String,
+    pub(crate) seed: u64,
+    pub(crate) map: MapReport,
+    pub(crate) episodes: u32,
+    pub(crate) successes: u32,
+    pub(crate) success_rate: f64,
+    pub(crate) lower95: f64,
+    pub(crate) upper95: f64,
+    pub(crate) collisions: u32,
+    pub(crate) timeouts: u32,
+    pub(crate) strays: u32,
+    pub(crate) recoveries: u32,
+    pub(crate) mean_sim_time_s: f64,
+    pub(crate) mean_path_m: f64,
+    pub(crate) env_steps: u64,
+    pub(crate) gradient_steps: u64,
+    pub(crate) decision_us: DecisionTimes,
+    pub(crate) time_s: BaselineTimes,
 }
 
 /// The problem with everything around it.
@@ -82,6 +82,23 @@ struct Measured {
 }
 
 pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let bar = spinner(args.method.name());
+    let report = measure(args, seed)?;
+    bar.finish_and_clear();
+    if json {
+        say!("{}", to_json(&report));
+    } else {
+        print_report(&report);
+    }
+    Ok(match report.status {
+        _ if is_interrupted() => Exit::Interrupted,
+        "driven" => Exit::Done,
+        _ => Exit::No,
+    })
+}
+
+/// Prepares the system, drives and counts; prints nothing. After an interrupt the counts are those so far.
+pub(crate) fn measure(args: &Baseline, seed: u64) -> Result<BaselineReport, Failure> {
     let mut stopwatch = Stopwatch::start();
     stopwatch.enter("load");
     let limit_s = args.time_limit.unwrap_or(TIME_LIMIT_S);
@@ -96,22 +113,9 @@ pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failur
     input::check_query(&workspace, &query)?;
     let settings = comparison(args, noise, seed)?;
     let bench = Bench { args, workspace, query, settings, seed: Seed(seed).child("baseline", 0) };
-
-    let bar = spinner(args.method.name());
     let stop = || is_interrupted() || deadline.is_some_and(|deadline| Instant::now() >= deadline);
     let measured = bench.measure(&mut stopwatch, &stop)?;
-    bar.finish_and_clear();
-    let report = bench.report(seed, MapReport::new(&map.name, &map.grid), measured.as_ref(), &stopwatch);
-    if json {
-        say!("{}", to_json(&report));
-    } else {
-        print_report(&report);
-    }
-    Ok(match measured {
-        _ if is_interrupted() => Exit::Interrupted,
-        Some(_) => Exit::Done,
-        None => Exit::No,
-    })
+    Ok(bench.report(seed, MapReport::new(&map.name, &map.grid), measured.as_ref(), &stopwatch))
 }
 
 fn comparison(args: &Baseline, noise: NoiseModel, seed: u64) -> Result<ComparisonSettings, Failure> {

@@ -1,245 +1,127 @@
 //! `sharp eval`: suites of problems, one JSON line a result, and a report.
+//!
+//! Planning, running and merging of jobs in one call: what it leaves is what `sharp jobs` leaves.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Instant;
+use std::time::Duration;
 
-use clap::ValueEnum;
-use sharp_plan::{RunSettings, run as run_plan, write_atomic};
-use sharp_space::Seed;
-
-use crate::args::{AbstractionArgs, Eval, Guide, Kind, MapArgs, Metric, Solve, Suite, Switch, Unknown};
-use crate::commands::solve::{Solved, solve_problem};
-use crate::evaluation::{
-    self, BaselineLine, Evaluation, ResultLine, group, plan_folder, read_baselines, read_results, row_text,
+use crate::args::{Engine, Eval};
+use crate::evaluation::{self, Evaluation, ResultLine, read_baselines, row_text};
+use crate::jobs::{
+    Cluster, Job, Manifest, Submission, clean, command, count_results, is_queued, merge, run_jobs, specs,
+    unfinished,
 };
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::pictures;
 use crate::progress::{bar, is_interrupted};
-use crate::report::RunReport;
 
-/// One problem for one robot with one kind of option.
-#[derive(Clone, Debug, PartialEq)]
-struct Case {
-    env: String,
-    robot: &'static str,
-    kind: Kind,
-    problem: usize,
-}
+/// Times that jobs which a cluster lost are submitted.
+const ROUNDS: usize = 3;
+/// Between two looks at the queue.
+const LOOK: Duration = Duration::from_secs(2);
 
 pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let cases = selected(cases(args.suite)?, args)?;
-    let path = args.out.join("results.jsonl");
-    let baselines = baselines(args)?;
-    let mut lines = read_results(&path)?;
-    let progress = bar(cases.len() as u64, "evaluating");
-    for case in &cases {
-        if is_interrupted() {
-            return Ok(Exit::Interrupted);
-        }
-        progress.set_message(
-            format!("{} P{} {} {:?}", case.env, case.problem, case.robot, case.kind).to_lowercase(),
-        );
-        if !lines.iter().any(|line| is_result_of(line, case, args, seed)) {
-            let Some(line) = evaluate(case, args, seed)? else { return Ok(Exit::Interrupted) };
-            progress.println(row_text(&line));
-            lines.push(line);
-            let text: String = lines.iter().map(|line| to_json(line) + "\n").collect();
-            write_atomic(&path, text.as_bytes())?;
-        }
-        progress.inc(1);
+    let extra = baselines(args)?;
+    let command = full_command(args, seed);
+    let (manifest, indices) = Manifest::extend(&args.out, specs(&args.selection, seed)?, &command)?;
+    match args.engine {
+        Engine::Local => run_here(args, &manifest, &indices),
+        Engine::Slurm => run_on_cluster(&manifest, &indices)?,
     }
-    progress.finish_and_clear();
-    let wanted: Vec<&ResultLine> =
-        lines.iter().filter(|line| cases.iter().any(|case| is_result_of(line, case, args, seed))).collect();
-    let command = command(args, seed);
-    let rivals: Vec<ResultLine> = baselines.iter().map(ResultLine::from).collect();
-    let all = lines.iter().chain(&rivals).collect();
-    let page = evaluation::write(&Evaluation { lines: all, command, out: &args.out })?;
+    let merged = merge(&manifest)?;
+    if is_interrupted() {
+        return Ok(Exit::Interrupted);
+    }
+    let wanted = |&&index: &&usize| &merged.results[index].1;
+    let lines: Vec<&ResultLine> =
+        indices.iter().flat_map(|index| wanted(&index)).map(|done| &done.line).collect();
+    // Everything in the folder: what other calls measured there belongs to the same page.
+    let all = merged.results.iter().flat_map(|(_, results)| results).map(|done| &done.line);
+    let page = write_report(&args.out, all.chain(&extra).collect(), command)?;
     if json {
-        for line in wanted {
+        for line in &lines {
             say!("{}", to_json(line));
         }
     } else {
-        say!("{}", evaluation::table(&wanted));
-        say!("results in {}, pictures of every plan in {}", path.display(), args.out.join("plans").display());
+        let of_sharp: Vec<&ResultLine> = lines.iter().copied().filter(|line| line.is_of_sharp()).collect();
+        say!("{}", evaluation::table(&of_sharp));
+        say!("results in {}, plans and pictures in {}", show(args, "results.jsonl"), show(args, "jobs"));
         say!("report in {}", page.display());
     }
+    if unfinished(&manifest).iter().any(|index| indices.contains(index)) {
+        return Ok(Exit::Partial);
+    }
+    clean(&manifest);
     Ok(Exit::Done)
 }
 
-/// The baselines that were measured elsewhere.
-fn baselines(args: &Eval) -> Result<Vec<BaselineLine>, Failure> {
+/// Writes the report of `lines`; returns its page.
+///
+/// # Errors
+/// Returns an error if it cannot be written.
+pub(super) fn write_report(out: &Path, lines: Vec<&ResultLine>, command: String) -> Result<PathBuf, Failure> {
+    evaluation::write(&Evaluation { lines, command, out })
+}
+
+fn show(args: &Eval, name: &str) -> String {
+    args.out.join(name).display().to_string()
+}
+
+/// The baselines that another run measured.
+fn baselines(args: &Eval) -> Result<Vec<ResultLine>, Failure> {
     Ok(args.baselines.as_deref().map(read_baselines).transpose()?.unwrap_or_default())
 }
 
-/// The call that gives the same results, with everything that decides them.
-fn command(args: &Eval, seed: u64) -> String {
-    let name = |value: Option<clap::builder::PossibleValue>| {
-        value.map_or_else(String::new, |value| value.get_name().to_owned())
-    };
-    let numbers: Vec<String> = args.problems.iter().map(ToString::to_string).collect();
-    let mut command = format!(
-        "sharp --seed {seed} eval {} --episodes {} --learning {} --noise {} --regions {}",
-        name(args.suite.to_possible_value()),
-        args.episodes,
-        args.learning.name(),
-        args.noise,
-        args.regions
-    );
-    for (flag, value) in [
-        ("envs", args.envs.join(",")),
-        ("robots", args.robots.join(",")),
-        ("options", name(args.options.and_then(|kind| kind.to_possible_value()))),
-        ("problems", numbers.join(",")),
-        ("baselines", args.baselines.as_ref().map_or_else(String::new, |path| path.display().to_string())),
-        ("out", args.out.display().to_string()),
-    ] {
-        if !value.is_empty() {
-            command += &format!(" --{flag} {value}");
-        }
+/// The call that gives the same results and the same report.
+fn full_command(args: &Eval, seed: u64) -> String {
+    let mut text = command("eval", &args.selection, seed);
+    if let Some(path) = &args.baselines {
+        text += &format!(" --baselines {}", path.display());
     }
-    command
+    text + &format!(" --out {}", args.out.display())
 }
 
-fn cases(suite: Suite) -> Result<Vec<Case>, Failure> {
-    let (envs, robots): (Vec<&str>, &[&'static str]) = match suite {
-        Suite::Smoke => (vec!["a"], &["husky"]),
-        Suite::Quick => (sharp_maps::named_maps().collect(), &["husky", "limo"]),
-    };
-    let mut cases = Vec::new();
-    for env in envs {
-        let problems = sharp_maps::load(env, &sharp_maps::LoadOptions::default())?.problems.len();
-        for &robot in robots {
-            for kind in [Kind::Centroid, Kind::Interface] {
-                cases.extend((1..=problems).map(|problem| Case {
-                    env: env.to_owned(),
-                    robot,
-                    kind,
-                    problem,
-                }));
-            }
-        }
-    }
-    Ok(cases)
-}
-
-/// The cases that `args` asks for; a name that selects nothing is an error.
-fn selected(mut cases: Vec<Case>, args: &Eval) -> Result<Vec<Case>, Failure> {
-    for (flag, names, known) in [
-        ("--envs", &args.envs, cases.iter().map(|case| case.env.as_str()).collect::<Vec<_>>()),
-        ("--robots", &args.robots, cases.iter().map(|case| case.robot).collect()),
-    ] {
-        if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
-            return Err(Failure::new("USAGE", format!("{flag}: the suite has no {name:?}")));
-        }
-    }
-    if let Some(number) =
-        args.problems.iter().find(|&&number| cases.iter().all(|case| case.problem != number))
-    {
-        return Err(Failure::new("USAGE", format!("--problems: the suite has no problem {number}")));
-    }
-    cases.retain(|case| {
-        (args.envs.is_empty() || args.envs.contains(&case.env))
-            && (args.robots.is_empty() || args.robots.iter().any(|name| name == case.robot))
-            && args.options.is_none_or(|kind| kind == case.kind)
-            && (args.problems.is_empty() || args.problems.contains(&case.problem))
+/// Does the jobs on threads of this process; those that fail are told and left unfinished.
+fn run_here(args: &Eval, manifest: &Manifest, indices: &[usize]) {
+    let jobs: Vec<&Job> = indices.iter().map(|&index| &manifest.jobs[index]).collect();
+    let steps: usize = jobs.iter().map(|job| job.spec.problems.len()).sum();
+    let progress = bar(steps as u64, "evaluating");
+    progress.enable_steady_tick(Duration::from_millis(500));
+    let workers = args.jobs.map_or_else(rayon::current_num_threads, |jobs| jobs as usize);
+    let ended = run_jobs(&manifest.dir, &jobs, workers, &|line| {
+        progress.println(row_text(line));
+        progress.inc(1);
     });
-    Ok(cases)
-}
-
-fn is_result_of(line: &ResultLine, case: &Case, args: &Eval, seed: u64) -> bool {
-    line.env == case.env
-        && line.problem == case.problem
-        && line.robot == case.robot
-        && line.options == sharp_plan::kind_name(case.kind.into())
-        && line.regions == args.regions
-        && line.noise == args.noise
-        && line.learning == args.learning.name()
-        && line.seed == seed
-        && line.episodes == args.episodes
-}
-
-/// Solves and runs one case; `None` if it was interrupted.
-fn evaluate(case: &Case, args: &Eval, seed: u64) -> Result<Option<ResultLine>, Failure> {
-    let kind = sharp_plan::kind_name(case.kind.into());
-    let group = group(&case.env, case.robot, kind, args.learning.name(), seed, &args.regions);
-    let folder = plan_folder(&args.out, &group, case.problem);
-    let solve = solve_args(case, args, args.out.join("library").join(&group), folder.clone());
-    let Solved { report, plan } = solve_problem(&solve, seed)?;
-    if plan.is_none() && is_interrupted() {
-        return Ok(None);
-    }
-    let run = plan.map(|plan| drive(&Arc::new(plan), args.episodes, seed, &folder)).transpose()?;
-    Ok(Some(ResultLine {
-        schema: "sharp.result/1".to_owned(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        method: "sharp".to_owned(),
-        learning: report.learning.to_owned(),
-        env: case.env.clone(),
-        problem: case.problem,
-        robot: case.robot.to_owned(),
-        options: kind.to_owned(),
-        regions: args.regions.clone(),
-        options_available: report.options_available,
-        noise: args.noise.clone(),
-        variant: "default".to_owned(),
-        trial: 0,
-        seed,
-        status: report.status.to_owned(),
-        episodes: args.episodes,
-        successes: run.as_ref().map_or(0, |run| run.successes),
-        collisions: run.as_ref().map_or(0, |run| run.collisions),
-        timeouts: run.as_ref().map_or(0, |run| run.timeouts),
-        recoveries: run.as_ref().map_or(0, |run| run.recoveries),
-        mean_sim_time_s: run.as_ref().map_or(0.0, |run| run.mean_sim_time_s),
-        predicted_success: report.predicted.as_ref().map_or(0.0, |predicted| predicted.success),
-        reuse: report.reuse,
-        env_steps: report.plan.iter().filter(|leg| !leg.reused).map(|leg| leg.env_steps).sum(),
-        gradient_steps: report.plan.iter().filter(|leg| !leg.reused).map(|leg| leg.gradient_steps).sum(),
-        time_s: report.time_s,
-    }))
-}
-
-fn solve_args(case: &Case, args: &Eval, library: PathBuf, out: PathBuf) -> Solve {
-    let map =
-        MapArgs { map: case.env.clone(), resolution: None, unknown: Unknown::Blocked, allow_outside: false };
-    let abstraction = AbstractionArgs {
-        robot: case.robot.to_owned(),
-        options: case.kind,
-        regions: args.regions.clone(),
-        metric: Metric::Geodesic,
-    };
-    Solve {
-        map,
-        abstraction,
-        start: None,
-        goal: None,
-        problem: Some(case.problem),
-        learning: args.learning,
-        noise: args.noise.clone(),
-        cost_update: Switch::On,
-        guide: Guide::Ridge,
-        library: Some(library.display().to_string()),
-        out: Some(out),
-        time_limit: Some(2400.0),
-        tensorboard: None,
+    progress.finish_and_clear();
+    for failure in ended.into_iter().filter_map(Result::err) {
+        eprintln!("error: {failure}");
     }
 }
 
-/// Executes the plan, draws what was driven, and counts.
-fn drive(
-    plan: &Arc<sharp_plan::Plan>,
-    episodes: u32,
-    seed: u64,
-    folder: &Path,
-) -> Result<RunReport, Failure> {
-    let begun = Instant::now();
-    // Executions draw their noise from another root than learning did.
-    let settings = RunSettings::new(plan, episodes, Seed(seed).child("evaluation", 0));
-    let driven = run_plan(plan, &settings, &|| begun.elapsed().as_secs_f64() * 1e6);
-    pictures::write(folder, "run", &pictures::plan(plan, &plan.solution.query, &driven))?;
-    Ok(RunReport::new(plan, &driven))
+/// Submits what is not finished, waits, and submits again what the cluster lost.
+fn run_on_cluster(manifest: &Manifest, indices: &[usize]) -> Result<(), Failure> {
+    let submission = Submission { array_limit: None, time_min: None, pack_s: 600.0, sbatch: vec![] };
+    let steps: usize = indices.iter().map(|&index| manifest.jobs[index].spec.problems.len()).sum();
+    let progress = bar(steps as u64, "evaluating");
+    for _ in 0..ROUNDS {
+        let open: Vec<usize> =
+            unfinished(manifest).into_iter().filter(|index| indices.contains(index)).collect();
+        if open.is_empty() {
+            break;
+        }
+        let cluster = Cluster::write(manifest, &open, &submission)?;
+        let array = cluster.submit()?;
+        eprintln!("array {array} of {} tasks, logs in {}", cluster.tasks, cluster.logs().display());
+        while is_queued(&array)? {
+            if is_interrupted() {
+                eprintln!("array {array} goes on; this call again finds what it made");
+                return Ok(());
+            }
+            progress.set_position(count_results(manifest, indices) as u64);
+            std::thread::sleep(LOOK);
+        }
+    }
+    progress.finish_and_clear();
+    Ok(())
 }
 
 #[cfg(test)]
@@ -251,10 +133,11 @@ mod tests {
 
     #[test]
     fn the_command_of_a_report_says_everything_that_decides_it() {
-        let text = "sharp --seed 7 eval quick --episodes 50 --learning fast --noise harsh --regions grid \
-                    --envs a,b --options interface --problems 1,3 --out here";
+        let text = "sharp --seed 7 eval quick --episodes 50 --noise harsh,none --regions grid --recovery off \
+                    --cost-update on --time-limit 60 --learning fast,paper --envs a,b --options interface \
+                    --problems 1,3 --methods sharp,rrt-contact --trials 2 --baselines here.jsonl --out here";
         let cli = Cli::parse_from(text.split_whitespace());
         let Command::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
-        assert_eq!(command(args, cli.seed), text);
+        assert_eq!(full_command(args, cli.seed), text);
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use indicatif::ProgressBar;
 use sharp_guide::GuidePlanner;
 use sharp_maps::MapFile;
 use sharp_plan::{
@@ -13,7 +14,7 @@ use sharp_space::Seed;
 use crate::args::{Guide, Learning, Solve, Switch};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::pipeline::{self, Built};
-use crate::progress::{SolveMonitor, Stopwatch, is_interrupted};
+use crate::progress::{SolveMonitor, Stopwatch, is_interrupted, spinner};
 use crate::report::{MapReport, Reuse, SolveReport, SolveTimes};
 use crate::{input, pictures};
 
@@ -34,7 +35,7 @@ pub(crate) struct Solved {
 }
 
 pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let Solved { report, plan } = solve_problem(args, seed)?;
+    let Solved { report, plan } = solve_problem(args, seed, spinner("searching"))?;
     if json {
         say!("{}", to_json(&report));
     } else {
@@ -47,8 +48,8 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     })
 }
 
-/// Solves and writes the plan folder; prints nothing.
-pub(crate) fn solve_problem(args: &Solve, seed: u64) -> Result<Solved, Failure> {
+/// Solves and writes the plan folder; shows on `spinner` what it does and prints nothing.
+pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Result<Solved, Failure> {
     let mut stopwatch = Stopwatch::start();
     stopwatch.enter("load");
     let time_limit = args.time_limit.map(limit).transpose()?;
@@ -69,7 +70,8 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64) -> Result<Solved, Failure> 
     if args.guide == Guide::Paper {
         settings.search.guide.planner = GuidePlanner::LearnAndLink;
     }
-    let monitor = SolveMonitor::new(stopwatch, time_limit, args.tensorboard.as_deref());
+    let curves = args.tensorboard.as_deref();
+    let monitor = SolveMonitor::new(stopwatch, time_limit, spinner, curves);
     let outcome = solve(&workspace, &abstraction, query, &settings, &mut library, &monitor)?;
     let stopwatch = monitor.into_stopwatch();
 

@@ -53,14 +53,17 @@ pub(super) struct Results<'a> {
 }
 
 impl<'a> Results<'a> {
+    /// Of `lines` that measure the same thing, as when a problem was run alone and then in a suite, the last
+    /// counts.
     pub(super) fn new(lines: &[&'a ResultLine]) -> Self {
+        let lines = without_repeats(lines);
         let mut counts: BTreeMap<Setting<'a>, usize> = BTreeMap::new();
         for line in lines.iter().filter(|line| line.is_of_sharp()) {
             *counts.entry(Setting::of(line)).or_insert(0) += 1;
         }
         let most = counts.iter().max_by_key(|&(&setting, &count)| (setting == Setting::USUAL, count));
         let main = most.map_or(Setting::USUAL, |(&setting, _)| setting);
-        Self { lines: lines.to_vec(), main }
+        Self { lines, main }
     }
 
     /// SHARP's results with `setting`.
@@ -80,6 +83,18 @@ impl<'a> Results<'a> {
         compared.extend(self.lines.iter().copied().filter(is_rival));
         compared
     }
+}
+
+fn without_repeats<'a>(lines: &[&'a ResultLine]) -> Vec<&'a ResultLine> {
+    let mut seen = BTreeSet::new();
+    let mut last: Vec<&'a ResultLine> = lines
+        .iter()
+        .rev()
+        .copied()
+        .filter(|line| seen.insert((problem(line), method(line), Setting::of(line), line.trial, line.seed)))
+        .collect();
+    last.reverse();
+    last
 }
 
 /// One method on one problem, all trials together.
@@ -204,6 +219,16 @@ mod tests {
         assert_eq!(cases[0].tally, Tally { episodes: 60, successes: 30 });
         assert_eq!(cases[0].trials, 3);
         assert_eq!(cases[0].driving_s.map(|time| time.mean), Some(25.0), "who never arrived has no time");
+    }
+
+    #[test]
+    fn what_was_measured_twice_counts_once() {
+        let old = ResultLine { successes: 3, ..ResultLine::example("a", "limo", "centroid", 1) };
+        let new = ResultLine { successes: 4, ..old.clone() };
+        let other = ResultLine { seed: 2, ..old.clone() };
+        let results = Results::new(&[&old, &other, &new]);
+        let successes: Vec<u32> = results.lines.iter().map(|line| line.successes).collect();
+        assert_eq!(successes, [3, 4], "of seed 2, and the later one of seed 1");
     }
 
     #[test]

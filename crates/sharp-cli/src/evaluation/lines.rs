@@ -1,24 +1,27 @@
-//! The lines that a report reads: `sharp.result/1` of `sharp eval`, and those of `cargo xtask baselines`.
+//! The lines that a report reads: `sharp.result/1`, of SHARP and of the systems to compare with.
 
 use std::path::{Path, PathBuf};
 
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sharp_plan::Tally;
 
+use crate::args::Switch;
 use crate::outcome::Failure;
-use crate::report::{Reuse, SolveTimes};
+use crate::report::{DecisionTimes, Reuse, SolveTimes};
 
 /// `sharp.result/1`: one line of `results.jsonl`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct ResultLine {
     pub(crate) schema: String,
     pub(crate) version: String,
+    /// sharp, rrt, rrt-contact, track, mppi or sac.
     pub(crate) method: String,
+    /// fast, paper or prior; none for the baselines.
     pub(crate) learning: String,
     pub(crate) env: String,
     pub(crate) problem: usize,
     pub(crate) robot: String,
+    /// The kind of option; none for the baselines.
     pub(crate) options: String,
     #[serde(default = "default_regions")]
     pub(crate) regions: String,
@@ -26,11 +29,14 @@ pub(crate) struct ResultLine {
     #[serde(default)]
     pub(crate) options_available: usize,
     pub(crate) noise: String,
-    /// What was switched off: default, no_recovery, no_cost_update or both with a plus between.
+    /// What was switched off: `default`, `no_recovery`, `no_cost_update` or both with a plus between.
     #[serde(default = "default_variant")]
     pub(crate) variant: String,
+    #[serde(default = "default_simulator")]
+    pub(crate) simulator: String,
     pub(crate) trial: u32,
     pub(crate) seed: u64,
+    /// `solved`, `no_plan` or `timeout`; `driven` for the baselines.
     pub(crate) status: String,
     pub(crate) episodes: u32,
     pub(crate) successes: u32,
@@ -42,7 +48,23 @@ pub(crate) struct ResultLine {
     pub(crate) reuse: Reuse,
     pub(crate) env_steps: u64,
     pub(crate) gradient_steps: u64,
+    #[serde(default)]
+    pub(crate) decision_us: DecisionTimes,
     pub(crate) time_s: SolveTimes,
+    #[serde(default)]
+    pub(crate) machine: Machine,
+    /// The job that measured it.
+    #[serde(default)]
+    pub(crate) job: String,
+}
+
+/// Where times were taken.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Machine {
+    /// Model of the processor; empty if the system does not tell.
+    pub(crate) cpu: String,
+    /// Cores of the whole machine.
+    pub(crate) cores: usize,
 }
 
 /// What results were made with before there was a choice.
@@ -51,7 +73,19 @@ pub(crate) fn default_regions() -> String {
 }
 
 fn default_variant() -> String {
-    "default".to_owned()
+    variant(Switch::On, Switch::On)
+}
+
+fn default_simulator() -> String {
+    "rapier2d".to_owned()
+}
+
+/// The name of what was switched off.
+pub(crate) fn variant(recovery: Switch, cost_update: Switch) -> String {
+    let off = [("no_recovery", recovery), ("no_cost_update", cost_update)];
+    let off: Vec<&str> =
+        off.iter().filter(|(_, switch)| *switch == Switch::Off).map(|&(name, _)| name).collect();
+    if off.is_empty() { "default".to_owned() } else { off.join("+") }
 }
 
 impl ResultLine {
@@ -67,126 +101,42 @@ impl ResultLine {
         self.method == "sharp"
     }
 
-    /// Name of the library that the problem shared with others.
-    pub(crate) fn group(&self) -> String {
-        group(&self.env, &self.robot, &self.options, &self.learning, self.seed, &self.regions)
-    }
-
     /// Where the plan lies below the folder of the evaluation.
     pub(crate) fn plan_folder(&self, out: &Path) -> PathBuf {
-        plan_folder(out, &self.group(), self.problem)
+        problem_folder(out, &self.job, self.problem)
     }
 }
 
-/// Problems of one environment, robot and kind share a library: P2 to P5 reuse what P1 learnt.
-pub(crate) fn group(env: &str, robot: &str, kind: &str, learning: &str, seed: u64, regions: &str) -> String {
-    let group = format!("{env}-{robot}-{kind}-{learning}-{seed}");
-    if regions == default_regions() { group } else { format!("{group}-{regions}") }
+/// Where everything of one problem of one job lies below the folder of the evaluation.
+pub(crate) fn problem_folder(out: &Path, job: &str, problem: usize) -> PathBuf {
+    out.join("jobs").join(job).join(format!("p{problem}"))
 }
 
-/// Where the plan of `problem` lies below the folder of the evaluation.
-pub(crate) fn plan_folder(out: &Path, group: &str, problem: usize) -> PathBuf {
-    out.join("plans").join(format!("{group}-p{problem}"))
-}
-
-/// One case of `cargo xtask baselines`.
-#[derive(Clone, Debug, Deserialize)]
-pub(crate) struct BaselineLine {
-    pub(crate) method: String,
-    pub(crate) noise: String,
-    pub(crate) env: String,
-    pub(crate) robot: String,
-    pub(crate) problem: usize,
-    pub(crate) report: BaselineCounts,
-}
-
-/// The part of `sharp.baseline/1` that a report shows.
-#[derive(Clone, Debug, Deserialize)]
-pub(crate) struct BaselineCounts {
-    pub(crate) episodes: u32,
-    pub(crate) successes: u32,
-    /// Simulated seconds of successful executions, mean; 0 without any.
-    pub(crate) mean_sim_time_s: f64,
-    #[serde(default)]
-    pub(crate) env_steps: u64,
-    #[serde(default)]
-    pub(crate) time_s: BaselineTimes,
-}
-
-/// Wall time of a baseline, seconds.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
-pub(crate) struct BaselineTimes {
-    pub(crate) plan: f64,
-    pub(crate) learn: f64,
-}
-
-impl From<&BaselineLine> for ResultLine {
-    fn from(line: &BaselineLine) -> Self {
-        let BaselineLine { method, noise, env, robot, problem, report } = line;
-        let time_s =
-            SolveTimes { plan: report.time_s.plan, learn: report.time_s.learn, ..SolveTimes::default() };
-        Self {
-            schema: "sharp.result/1".to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            method: method.clone(),
-            learning: "none".to_owned(),
-            env: env.clone(),
-            problem: *problem,
-            robot: robot.clone(),
-            options: "none".to_owned(),
-            regions: default_regions(),
-            options_available: 0,
-            noise: noise.clone(),
-            variant: default_variant(),
-            trial: 0,
-            seed: 1,
-            status: "driven".to_owned(),
-            episodes: report.episodes,
-            successes: report.successes,
-            collisions: 0,
-            timeouts: 0,
-            recoveries: 0,
-            mean_sim_time_s: report.mean_sim_time_s,
-            predicted_success: 0.0,
-            reuse: Reuse { uses: 0, reused: 0 },
-            env_steps: report.env_steps,
-            gradient_steps: 0,
-            time_s,
-        }
-    }
-}
-
-/// The results that an earlier run left; none if there was none.
+/// The baselines among the results in `path`; a last line that is still being written is left out.
 ///
 /// # Errors
-/// Returns an error that names the first line that is no result.
-pub(crate) fn read_results(path: &Path) -> Result<Vec<ResultLine>, Failure> {
-    std::fs::read_to_string(path).map_or_else(|_| Ok(vec![]), |text| parse(path, &text))
-}
-
-/// The baselines in `path`; a last line that is still being written is left out.
-///
-/// # Errors
-/// Returns an error if there is no such file, or that names the first line that is no baseline.
-pub(crate) fn read_baselines(path: &Path) -> Result<Vec<BaselineLine>, Failure> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| Failure::new("FILE_INVALID", format!("{}: {error}", path.display())))?;
-    parse(path, text.rfind('\n').map_or("", |end| &text[..end]))
-}
-
-fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<Vec<T>, Failure> {
-    text.lines()
+/// Returns an error if there is no such file, or that names the first line that is no result.
+pub(crate) fn read_baselines(path: &Path) -> Result<Vec<ResultLine>, Failure> {
+    let broken = |problem: String| Failure::new("FILE_INVALID", format!("{}{problem}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| broken(format!(": {error}")))?;
+    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+    let mut lines: Vec<ResultLine> = whole
+        .lines()
         .enumerate()
         .map(|(index, line)| {
-            serde_json::from_str(line).map_err(|error| {
-                Failure::new("FILE_INVALID", format!("{} line {}: {error}", path.display(), index + 1))
-            })
+            serde_json::from_str(line).map_err(|error| broken(format!(" line {}: {error}", index + 1)))
         })
-        .collect()
+        .collect::<Result<_, _>>()?;
+    lines.retain(|line| !line.is_of_sharp());
+    Ok(lines)
 }
 
 /// One result for the terminal.
 pub(crate) fn row_text(line: &ResultLine) -> String {
+    let ResultLine { env, problem, robot, method, successes, episodes, .. } = line;
+    if !line.is_of_sharp() {
+        return format!("{env} P{problem} {robot} {method}: {successes} of {episodes}");
+    }
     format!(
         "{} P{} {} {}: {} of {} (predicted {:.3}), reused {} of {}, {:.1} s",
         line.env,
@@ -229,6 +179,10 @@ impl ResultLine {
             mean_sim_time_s: 25.0,
             predicted_success: 0.98,
             variant: default_variant(),
+            simulator: default_simulator(),
+            decision_us: DecisionTimes::default(),
+            machine: Machine::default(),
+            job: format!("{env}-{robot}-{kind}"),
             reuse: Reuse { uses: 4, reused: 1 },
             env_steps: 0,
             gradient_steps: 0,
@@ -240,25 +194,40 @@ impl ResultLine {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::outcome::to_json;
 
     #[test]
     fn a_baseline_cut_short_is_left_out() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("baselines.jsonl");
-        let line = r#"{"method":"rrt","noise":"none","env":"a","robot":"limo","problem":1,"report":{"episodes":20,"successes":9,"mean_sim_time_s":3.0}}"#;
-        std::fs::write(&path, format!("{line}\n{}", &line[..30])).expect("a file");
-        let lines = read_baselines(&path).expect("one whole line");
-        assert_eq!(lines.len(), 1, "{lines:?}");
+        let of_sharp = to_json(&ResultLine::example("a", "limo", "centroid", 3));
+        let line = of_sharp.replace("\"method\":\"sharp\"", "\"method\":\"rrt\"");
+        std::fs::write(&path, format!("{of_sharp}\n{line}\n{}", &line[..30])).expect("a file");
+        let lines = read_baselines(&path).expect("whole lines");
+        assert_eq!(lines.len(), 1, "one is of SHARP, one is cut short: {lines:?}");
+        assert_eq!((lines[0].problem, lines[0].episodes), (3, 20), "{lines:?}");
         std::fs::write(&path, format!("{line}\n{{}}\n")).expect("a file");
-        let error = read_baselines(&path).expect_err("a line without a method").to_string();
-        assert!(error.contains("baselines.jsonl line 2: missing field `method`"), "{error}");
+        let error = read_baselines(&path).expect_err("a line without a schema").to_string();
+        assert!(error.contains("baselines.jsonl line 2: missing field `schema`"), "{error}");
     }
 
     #[test]
-    fn groups_name_their_regions_unless_they_are_the_usual_ones() {
-        let mut line = ResultLine::example("a", "limo", "centroid", 3);
-        assert_eq!(line.plan_folder(Path::new("out")), Path::new("out/plans/a-limo-centroid-fast-1-p3"));
-        line.regions = "grid".into();
-        assert_eq!(line.group(), "a-limo-centroid-fast-1-grid");
+    fn variants_name_what_is_off() {
+        let names = [(Switch::On, Switch::On), (Switch::Off, Switch::On), (Switch::Off, Switch::Off)];
+        assert_eq!(
+            names.map(|(recovery, cost_update)| variant(recovery, cost_update)),
+            ["default", "no_recovery", "no_recovery+no_cost_update"]
+        );
+    }
+
+    #[test]
+    fn a_line_of_before_reads_with_what_was_meant_then() {
+        let mut line = serde_json::to_value(ResultLine::example("a", "limo", "centroid", 3)).expect("JSON");
+        let fields = line.as_object_mut().expect("an object");
+        for field in ["variant", "simulator", "machine", "decision_us", "job"] {
+            assert!(fields.remove(field).is_some(), "{field} is printed");
+        }
+        let line: ResultLine = serde_json::from_value(line).expect("all of them have defaults");
+        assert_eq!((&*line.variant, &*line.simulator), ("default", "rapier2d"));
     }
 }

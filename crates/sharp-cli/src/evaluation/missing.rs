@@ -32,10 +32,13 @@ pub(super) fn missing(results: &Results<'_>, out: &Path) -> Vec<Missing> {
     let kept = if noise == Setting::USUAL.noise { String::new() } else { format!(" --noise '{noise}'") };
     let lack = |what: &str, flags: &str| Missing {
         what: what.to_owned(),
-        command: format!("sharp eval quick {flags} --out {}", out.display()),
+        command: format!("sharp eval quick --out {} {flags}", out.display()).trim_end().to_owned(),
     };
-    let mut all = Vec::new();
     let compared = results.compared();
+    if compared.is_empty() {
+        return vec![lack("everything", "")];
+    }
+    let mut all = Vec::new();
     for (flag, names, of) in WANTED {
         let there: BTreeSet<&str> = compared.iter().map(|line| of(line)).collect();
         let gone: Vec<&str> = names.iter().copied().filter(|name| !there.contains(name)).collect();
@@ -58,7 +61,9 @@ pub(super) fn missing(results: &Results<'_>, out: &Path) -> Vec<Missing> {
         all.push(lack("noise sweep", &format!("--noise {}", names.join(","))));
     }
     let ablations = ABLATIONS.iter().filter(|ablation| ablation.lines(results).is_empty());
-    all.extend(ablations.map(|ablation| lack(ablation.name, &format!("{}{kept}", ablation.flags))));
+    all.extend(
+        ablations.map(|ablation| lack(ablation.name, &format!("--methods sharp {}{kept}", ablation.flags))),
+    );
     all
 }
 
@@ -94,10 +99,10 @@ mod tests {
                 "the paper's learning"
             ]
         );
-        assert_eq!(missing[0].command, "sharp eval quick --envs b,c,d,e,f,g --out out");
+        assert_eq!(missing[0].command, "sharp eval quick --out out --envs b,c,d,e,f,g");
         assert_eq!(
             missing[4].command,
-            "sharp eval quick --noise none,nominal,'nominal*2','nominal*4' --out out"
+            "sharp eval quick --out out --noise none,nominal,'nominal*2','nominal*4'"
         );
     }
 }

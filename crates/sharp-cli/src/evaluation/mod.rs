@@ -28,7 +28,7 @@ use crate::outcome::Failure;
 use crate::render::svg_to_png;
 
 pub(crate) use lines::{
-    BaselineLine, ResultLine, group, plan_folder, read_baselines, read_results, row_text,
+    Machine, ResultLine, default_regions, problem_folder, read_baselines, row_text, variant,
 };
 pub(crate) use tables::table;
 
@@ -61,7 +61,7 @@ pub(crate) fn write(evaluation: &Evaluation<'_>) -> Result<PathBuf, Failure> {
     for picture in galleries.iter().flat_map(|gallery| &gallery.pictures) {
         write_atomic(&folder.join(format!("{}.png", picture.name)), &picture.png)?;
     }
-    write_atomic(&folder.join("ompl.log"), ompl::log(&evaluation.lines).as_bytes())?;
+    write_atomic(&folder.join("ompl.log"), ompl::log(&results.lines).as_bytes())?;
     let missing = missing::missing(&results, evaluation.out);
     write_atomic(&folder.join("tables.md"), tables::document(&results, &figures).as_bytes())?;
     let page = folder.join("index.html");
@@ -183,7 +183,7 @@ mod tests {
         for name in ["noise", "ablations", "time-d"] {
             assert!(!html.contains(&format!("<section id=\"{name}\">")), "an empty figure {name}");
         }
-        assert!(html.contains("<code>sharp eval quick --regions grid --out "), "{html}");
+        assert!(html.contains("--methods sharp --regions grid</code>"), "{html}");
         assert!(!html.contains("Nothing to show"), "{html}");
     }
 

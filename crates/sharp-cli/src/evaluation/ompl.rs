@@ -88,7 +88,7 @@ fn header(lines: &[&ResultLine], runs: usize) -> String {
          Running on sharp\n\
          Starting at 1970-01-01 00:00:00\n\
          <<<|\nOne run is one problem in one trial; its executions are counted in successes of episodes.\n|>>>\n\
-         <<<|\n|>>>\n\
+         <<<|\n{}|>>>\n\
          {seed} is the random seed\n\
          {TIME_LIMIT_S} seconds per run\n\
          0 MB per run\n\
@@ -96,8 +96,16 @@ fn header(lines: &[&ResultLine], runs: usize) -> String {
          {spent_s} seconds spent to collect the data\n\
          1 enum type\n\
          status|{}\n",
+        machines(lines),
         STATUS.join("|")
     )
+}
+
+/// One line a machine that took part.
+fn machines(lines: &[&ResultLine]) -> String {
+    let machines: BTreeSet<(&str, usize)> =
+        lines.iter().map(|line| (&*line.machine.cpu, line.machine.cores)).collect();
+    machines.into_iter().map(|(cpu, cores)| format!("{cores} cores, {}\n", cpu.replace('\n', " "))).collect()
 }
 
 fn planner(method: &str, setting: Setting<'_>, runs: &[&ResultLine]) -> String {
@@ -123,7 +131,7 @@ fn planner(method: &str, setting: Setting<'_>, runs: &[&ResultLine]) -> String {
 
 /// The method, and whatever in its setting is not usual.
 fn name(method: &str, setting: Setting<'_>) -> String {
-    let mut name = Style::of(method).label.replace([' ', ','], "_");
+    let mut name = Style::of(method).label.replace(", ", "_").replace(' ', "_");
     if name == "other" {
         name = token(method);
     }
@@ -149,6 +157,7 @@ fn token(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::lines::Machine;
 
     /// Reads `count NAME` and returns the count.
     fn counted(line: Option<&str>, name: &str) -> usize {
@@ -193,7 +202,8 @@ mod tests {
 
     #[test]
     fn the_header_has_every_line_in_its_place() {
-        let line = ResultLine::example("a", "limo", "centroid", 1);
+        let machine = Machine { cpu: "a processor".into(), cores: 4 };
+        let line = ResultLine { machine, ..ResultLine::example("a", "limo", "centroid", 1) };
         let log = log(&[&line]);
         let starts = [
             "SHARP version ",
@@ -205,6 +215,7 @@ mod tests {
             "One run is",
             "|>>>",
             "<<<|",
+            "4 cores, a processor",
             "|>>>",
             "1 is the random seed",
             "2400 seconds per run",

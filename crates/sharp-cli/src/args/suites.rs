@@ -1,0 +1,165 @@
+//! What `sharp eval` and `sharp jobs` may be asked.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use serde::{Deserialize, Serialize};
+
+use super::{Kind, Learning, Switch};
+
+#[derive(Debug, Args)]
+pub(crate) struct Eval {
+    #[command(flatten)]
+    pub(crate) selection: Selection,
+    /// Where results are written; a run that was stopped goes on where it was.
+    #[arg(long, value_name = "DIR", default_value = "out/eval")]
+    pub(crate) out: PathBuf,
+    /// Results of other runs, for the figures: the baselines in a results.jsonl.
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub(crate) baselines: Option<PathBuf>,
+    /// Who does the jobs: threads of this process, or a Slurm cluster.
+    #[arg(long, value_enum, default_value_t = Engine::Local)]
+    pub(crate) engine: Engine,
+    /// Jobs at once of the local engine, each on one thread [default: as many as --threads].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) jobs: Option<u32>,
+    /// Go on where an earlier run stopped; what is finished is never done again, with or without this.
+    #[arg(long)]
+    pub(crate) resume: bool,
+}
+
+/// Who does the jobs of a suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Engine {
+    Local,
+    Slurm,
+}
+
+/// A suite of problems, or a part of it.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Selection {
+    /// Which suite.
+    #[arg(value_enum, default_value_t = Suite::Smoke)]
+    pub(crate) suite: Suite,
+    /// Executions of each plan.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) episodes: u32,
+    /// How policies are learnt, separated by commas [default: fast; both in `paper`].
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub(crate) learning: Vec<Learning>,
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or noise files (.ron), separated
+    /// by commas.
+    #[arg(long, value_delimiter = ',', default_value = "nominal", value_name = "NAMES|FILES")]
+    pub(crate) noise: Vec<String>,
+    /// Only these maps of the suite: names, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    pub(crate) envs: Vec<String>,
+    /// Only these robots of the suite: names, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    pub(crate) robots: Vec<String>,
+    /// Only this kind of option.
+    #[arg(long, value_enum)]
+    pub(crate) options: Option<Kind>,
+    /// Where critical regions come from.
+    #[arg(long, default_value = "net", value_name = "net|geometric|random|grid")]
+    pub(crate) regions: String,
+    /// Only these problems of each map: numbers from 1, separated by commas.
+    #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
+    pub(crate) problems: Vec<usize>,
+    /// These methods instead of the suite's, separated by commas.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub(crate) methods: Vec<Contender>,
+    /// Independent repetitions [default: 1; 5 in `paper`].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) trials: Option<u32>,
+    /// Whether a robot that strayed, stands still or is late gets a new plan.
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    pub(crate) recovery: Switch,
+    /// Whether the search learns from the costs that were measured.
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    pub(crate) cost_update: Switch,
+    /// Wall time of solving one problem, or of one baseline on it, seconds.
+    #[arg(long, value_name = "S", default_value_t = 2400.0)]
+    pub(crate) time_limit: f64,
+}
+
+/// Suites of problems.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Suite {
+    /// Environment a, Husky, both kinds of option, and the baselines that need no learning.
+    Smoke,
+    /// The same on every named environment for both robots.
+    Quick,
+    /// The same with every baseline, both learning modes and five trials.
+    Paper,
+}
+
+/// What a suite measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Contender {
+    /// This project.
+    Sharp,
+    /// RRT with replanning; a contact is a failure.
+    Rrt,
+    /// RRT with replanning that bumps into walls and goes on, as in the paper.
+    RrtContact,
+    /// Tracking of a planned path.
+    Track,
+    /// Model-predictive path integral control.
+    Mppi,
+    /// One flat soft actor-critic policy.
+    Sac,
+}
+
+/// Jobs on many machines: plan once, run anywhere and as often as needed, merge.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Jobs {
+    /// Write DIR/manifest.jsonl: one line a job. Jobs that are planned already stay as they are.
+    Plan {
+        #[command(flatten)]
+        selection: Selection,
+        /// The folder that all jobs share.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    /// Do one job or a block of them; what is finished is left alone.
+    Run {
+        /// The folder that `sharp jobs plan` wrote.
+        dir: PathBuf,
+        /// Job N, or jobs N to M - 1 [default: the task's number in an array of Slurm or Kubernetes].
+        #[arg(long, value_name = "N[..M]")]
+        index: Option<String>,
+    },
+    /// Verify what all jobs left and write results.jsonl and the report; exit code 3 if jobs are missing.
+    Merge {
+        /// The folder that `sharp jobs plan` wrote.
+        dir: PathBuf,
+    },
+    /// Hand the jobs that are not finished to a cluster, and a merge that waits for them.
+    Submit(Submit),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Submit {
+    /// The folder that `sharp jobs plan` wrote, on a disk that all nodes share.
+    pub(crate) dir: PathBuf,
+    /// Slurm: one job array, one task a block of jobs.
+    #[arg(long, required = true)]
+    pub(crate) slurm: bool,
+    /// Tasks of the array at once.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) array_limit: Option<u32>,
+    /// Wall time of a task, minutes; a task that runs out of it is requeued and goes on.
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) time: Option<u32>,
+    /// Expected length of a task: short jobs are packed until they fill it, minutes.
+    #[arg(long, value_name = "M", default_value_t = 10.0)]
+    pub(crate) pack: f64,
+    /// Write and print the scripts, submit nothing.
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+    /// What else sbatch is told, after `--`: partition, account, memory.
+    #[arg(last = true, value_name = "SBATCH ARGS")]
+    pub(crate) sbatch: Vec<String>,
+}

@@ -1,0 +1,81 @@
+//! Putting together what all jobs left.
+
+use std::fs;
+
+use sharp_plan::write_atomic;
+
+use super::manifest::{Job, Manifest};
+use super::step::{Done, UNFINISHED};
+use super::work::steps;
+use crate::outcome::Failure;
+
+/// All results that are there, and the jobs that are not whole.
+#[derive(Debug)]
+pub(crate) struct Merged {
+    /// By job, each with its problems in order.
+    pub(crate) results: Vec<(usize, Vec<Done>)>,
+    /// What is wrong with each job that is not whole.
+    pub(crate) missing: Vec<Failure>,
+}
+
+/// Reads and verifies every result of `manifest` and writes those that are there to `results.jsonl`, in
+/// the order of the manifest.
+///
+/// # Errors
+/// Returns an error if `results.jsonl` cannot be written. Damage and gaps are in [`Merged::missing`].
+pub(crate) fn merge(manifest: &Manifest) -> Result<Merged, Failure> {
+    let mut merged = Merged { results: vec![], missing: vec![] };
+    for job in &manifest.jobs {
+        let (results, missing) = collect(manifest, job);
+        merged.results.push((job.index, results));
+        merged.missing.extend(missing);
+    }
+    let lines = merged.results.iter().flat_map(|(_, results)| results);
+    let text: String = lines.map(|done| format!("{}\n", done.text)).collect();
+    write_atomic(&manifest.dir.join("results.jsonl"), text.as_bytes())?;
+    Ok(merged)
+}
+
+/// The results of `job`, and what is wrong if they are not all there.
+fn collect(manifest: &Manifest, job: &Job) -> (Vec<Done>, Option<Failure>) {
+    let mut results = Vec::new();
+    let place = || format!("job {} ({})", job.index, job.name);
+    for step in steps(&manifest.dir, job) {
+        match step.read() {
+            Ok(Some(done)) => results.push(done),
+            Ok(None) => {
+                let failure = Failure::new("JOB_MISSING", format!("problem {} is missing", step.problem));
+                return (results, Some(failure.within(place())));
+            }
+            Err(failure) => return (results, Some(failure.within(place()))),
+        }
+    }
+    (results, None)
+}
+
+/// Indices of the jobs that are not whole.
+pub(crate) fn unfinished(manifest: &Manifest) -> Vec<usize> {
+    let is_open = |job: &&Job| collect(manifest, job).1.is_some();
+    manifest.jobs.iter().filter(is_open).map(|job| job.index).collect()
+}
+
+/// Number of results of the jobs `indices` that are there.
+pub(crate) fn count_results(manifest: &Manifest, indices: &[usize]) -> usize {
+    let of_job = |job| steps(&manifest.dir, job).filter(|step| step.folder().exists()).count();
+    indices.iter().map(|&index| of_job(&manifest.jobs[index])).sum()
+}
+
+/// Removes what killed processes left of the jobs of `manifest`, all of which are done.
+pub(crate) fn clean(manifest: &Manifest) {
+    for job in &manifest.jobs {
+        let folder = manifest.dir.join("jobs").join(&job.name);
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            if name.starts_with(".p") && name.ends_with(UNFINISHED) {
+                // Someone who still works there finds the step done and goes.
+                let _ = fs::remove_dir_all(entry.path());
+            }
+        }
+    }
+}

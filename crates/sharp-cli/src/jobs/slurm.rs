@@ -1,0 +1,228 @@
+//! The Slurm engine: unfinished jobs as one array, and a merge that waits for it.
+//!
+//! Slurm starts a few tasks a second at best, so that short jobs are packed into tasks of minutes. A task
+//! is `sharp jobs run` on a block of jobs: interrupted, it exits with 75, which a site lists under
+//! `RequeueExit`, and goes on where it was. A task that was killed outright is submitted again by the
+//! next `sharp jobs submit`, which looks at what is there and not at what a queue remembers.
+
+use std::fmt::Write;
+use std::ops::Range;
+use std::path::{Path, PathBuf, absolute};
+use std::process::Command;
+
+use anyhow::Context;
+use sharp_plan::write_atomic;
+
+use super::manifest::{Job, Manifest};
+use crate::outcome::Failure;
+
+/// Seconds before the end of a task's time at which it is asked to stop: enough to write what is done.
+const WARNING_S: u32 = 30;
+
+/// How jobs are handed over.
+#[derive(Clone, Debug)]
+pub(crate) struct Submission {
+    /// Tasks at once.
+    pub(crate) array_limit: Option<u32>,
+    /// Wall time of a task, minutes.
+    pub(crate) time_min: Option<u32>,
+    /// Expected length of a task, seconds.
+    pub(crate) pack_s: f64,
+    /// What else sbatch is told.
+    pub(crate) sbatch: Vec<String>,
+}
+
+/// The scripts for one folder.
+#[derive(Debug)]
+pub(crate) struct Cluster {
+    dir: PathBuf,
+    /// The script of the array.
+    pub(crate) array: PathBuf,
+    /// The script of the merge.
+    pub(crate) merge: PathBuf,
+    /// Number of tasks.
+    pub(crate) tasks: usize,
+    sbatch: Vec<String>,
+}
+
+impl Cluster {
+    /// Writes the scripts that do those of the jobs `indices` (ascending) that are not finished.
+    ///
+    /// # Errors
+    /// Returns an error if they cannot be written.
+    pub(crate) fn write(
+        manifest: &Manifest,
+        indices: &[usize],
+        submission: &Submission,
+    ) -> Result<Self, Failure> {
+        let dir = absolute(&manifest.dir).context("the folder of the jobs has no path")?;
+        let program = std::env::current_exe().context("this program has no path")?;
+        let jobs: Vec<&Job> = indices.iter().map(|&index| &manifest.jobs[index]).collect();
+        let blocks = blocks(&jobs, submission.pack_s);
+        let folder = dir.join("slurm");
+        let (array, merge) = (folder.join("array.sh"), folder.join("merge.sh"));
+        write_atomic(&array, array_script(&program, &dir, &blocks, submission).as_bytes())?;
+        write_atomic(&merge, merge_script(&program, &dir).as_bytes())?;
+        Ok(Self { dir, array, merge, tasks: blocks.len(), sbatch: submission.sbatch.clone() })
+    }
+
+    /// Submits the array and returns its number.
+    ///
+    /// # Errors
+    /// Returns an error that says what sbatch said.
+    pub(crate) fn submit(&self) -> Result<String, Failure> {
+        self.sbatch(&self.array, &[])
+    }
+
+    /// Submits the merge, which begins when every task of the array `id` has succeeded.
+    ///
+    /// # Errors
+    /// Returns an error that says what sbatch said.
+    pub(crate) fn submit_merge(&self, id: &str) -> Result<String, Failure> {
+        let after = format!("--dependency=afterok:{id}");
+        self.sbatch(&self.merge, &[&after, "--kill-on-invalid-dep=yes"])
+    }
+
+    fn sbatch(&self, script: &Path, extra: &[&str]) -> Result<String, Failure> {
+        let mut command = Command::new("sbatch");
+        command.arg("--parsable").args(&self.sbatch).args(extra).arg(script);
+        let output = command.output().context("cannot start sbatch")?;
+        let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
+        if !output.status.success() {
+            let script = script.display();
+            return Err(Failure::new("SLURM", format!("sbatch {script}: {}", said(&output.stderr))));
+        }
+        let id = said(&output.stdout);
+        // With several clusters the name of the cluster follows.
+        Ok(id.split(';').next().unwrap_or_default().to_owned())
+    }
+
+    /// Where the tasks write what they say.
+    pub(crate) fn logs(&self) -> PathBuf {
+        self.dir.join("slurm")
+    }
+}
+
+/// Returns true while Slurm has tasks of the array `id` that wait or run.
+///
+/// # Errors
+/// Returns an error if squeue cannot be started.
+pub(crate) fn is_queued(id: &str) -> Result<bool, Failure> {
+    let output = Command::new("squeue").args(["--noheader", "--format=%i", "--jobs", id]).output();
+    let output = output.context("cannot start squeue")?;
+    // A job that is over for some minutes is unknown, which is an error of squeue. One that cannot ask
+    // because the controller is away says so otherwise.
+    let text = String::from_utf8_lossy(&output.stderr);
+    Ok(if output.status.success() { !output.stdout.is_empty() } else { !text.contains("Invalid job id") })
+}
+
+/// Ranges of consecutive jobs, each expected to take `pack_s` at least if there are enough.
+fn blocks(jobs: &[&Job], pack_s: f64) -> Vec<Range<usize>> {
+    let mut blocks: Vec<Range<usize>> = Vec::new();
+    let mut weight_s = f64::INFINITY;
+    for job in jobs {
+        match blocks.last_mut() {
+            Some(block) if block.end == job.index && weight_s + job.weight_s <= pack_s => {
+                block.end += 1;
+                weight_s += job.weight_s;
+            }
+            _ => {
+                blocks.push(job.index..job.index + 1);
+                weight_s = job.weight_s;
+            }
+        }
+    }
+    blocks
+}
+
+fn array_script(program: &Path, dir: &Path, blocks: &[Range<usize>], submission: &Submission) -> String {
+    let limit = submission.array_limit.map_or(String::new(), |limit| format!("%{limit}"));
+    let mut options = vec![
+        "--job-name=sharp".to_owned(),
+        format!("--array=0-{}{limit}", blocks.len().saturating_sub(1)),
+        "--ntasks=1".to_owned(),
+        "--cpus-per-task=1".to_owned(),
+        "--requeue".to_owned(),
+        "--open-mode=append".to_owned(),
+        format!("--output={}", quoted(&dir.join("slurm/task-%A_%a.log"))),
+    ];
+    if let Some(minutes) = submission.time_min {
+        options.push(format!("--time={minutes}"));
+        options.push(format!("--signal=B:TERM@{WARNING_S}"));
+    }
+    let blocks: Vec<String> = blocks.iter().map(|block| format!("{}..{}", block.start, block.end)).collect();
+    let mut script = head(&options);
+    // Writing to a string cannot fail.
+    let _ = writeln!(script, "blocks=({})", blocks.join(" "));
+    let _ = writeln!(
+        script,
+        "exec {} --threads 1 jobs run {} --index \"${{blocks[$SLURM_ARRAY_TASK_ID]}}\"",
+        quoted(program),
+        quoted(dir)
+    );
+    script
+}
+
+fn merge_script(program: &Path, dir: &Path) -> String {
+    let options = [
+        "--job-name=sharp-merge".to_owned(),
+        "--ntasks=1".to_owned(),
+        "--open-mode=append".to_owned(),
+        format!("--output={}", quoted(&dir.join("slurm/merge-%j.log"))),
+    ];
+    head(&options) + &format!("exec {} jobs merge {}\n", quoted(program), quoted(dir))
+}
+
+fn head(options: &[String]) -> String {
+    let options: String = options.iter().map(|option| format!("#SBATCH {option}\n")).collect();
+    format!("#!/bin/bash\n{options}")
+}
+
+/// `path` as one word of a shell.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-%+=:,".contains(c);
+    if text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::spec::Spec;
+
+    fn manifest(dir: &Path, trials: u32) -> Manifest {
+        let specs = (0..trials).map(|trial| Spec { trial, ..Spec::example() }).collect();
+        Manifest::extend(dir, specs, "call").expect("a plan").0
+    }
+
+    #[test]
+    fn short_jobs_are_packed_and_gaps_are_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let manifest = manifest(folder.path(), 7);
+        let each_s = manifest.jobs[0].weight_s;
+        let jobs: Vec<&Job> = manifest.jobs.iter().filter(|job| job.index != 3).collect();
+        assert_eq!(blocks(&jobs, 2.5 * each_s), [0..2, 2..3, 4..6, 6..7], "two fit, job 3 is done");
+        assert_eq!(blocks(&jobs, 1e9), [0..3, 4..7], "all fit");
+        assert_eq!(blocks(&jobs, 0.0).len(), 6, "none fits with another");
+        assert!(blocks(&[], 1.0).is_empty(), "nothing to do");
+    }
+
+    #[test]
+    fn the_script_says_what_a_task_does() {
+        let submission = Submission {
+            array_limit: Some(8),
+            time_min: Some(90),
+            pack_s: 600.0,
+            sbatch: vec!["--partition=long".into()],
+        };
+        let script = array_script(Path::new("/opt/sharp"), Path::new("/my runs"), &[0..3, 3..4], &submission);
+        let expected = "#!/bin/bash\n#SBATCH --job-name=sharp\n#SBATCH --array=0-1%8\n#SBATCH --ntasks=1\n\
+             #SBATCH --cpus-per-task=1\n#SBATCH --requeue\n#SBATCH --open-mode=append\n\
+             #SBATCH --output='/my runs/slurm/task-%A_%a.log'\n#SBATCH --time=90\n\
+             #SBATCH --signal=B:TERM@30\nblocks=(0..3 3..4)\n\
+             exec /opt/sharp --threads 1 jobs run '/my runs' --index \"${blocks[$SLURM_ARRAY_TASK_ID]}\"\n";
+        assert_eq!(script, expected);
+        let merge = merge_script(Path::new("/opt/sharp"), Path::new("/runs"));
+        assert!(merge.ends_with("exec /opt/sharp jobs merge /runs\n"), "{merge}");
+    }
+}
