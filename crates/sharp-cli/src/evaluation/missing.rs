@@ -10,8 +10,9 @@ use super::noise;
 
 /// Levels of noise that a sweep needs, times nominal, and their names.
 const SWEEP: [(f64, &str); 4] = [(0.0, "none"), (1.0, "nominal"), (2.0, "'nominal*2'"), (4.0, "'nominal*4'")];
-/// Names of what a report compares, by the flag that selects them.
-const WANTED: [(&str, &[&str], fn(&ResultLine) -> &str); 4] = [
+/// A flag of `sharp eval`, all names that a whole report has of it, and the name of a result.
+type Dimension = (&'static str, &'static [&'static str], fn(&ResultLine) -> &str);
+const DIMENSIONS: [Dimension; 4] = [
     ("envs", &["a", "b", "c", "d", "e", "f", "g"], |line| &line.env),
     ("robots", &["husky", "limo"], |line| &line.robot),
     ("options", &["centroid", "interface"], |line| &line.options),
@@ -39,7 +40,7 @@ pub(super) fn missing(results: &Results<'_>, out: &Path) -> Vec<Missing> {
         return vec![lack("everything", "")];
     }
     let mut all = Vec::new();
-    for (flag, names, of) in WANTED {
+    for (flag, names, of) in DIMENSIONS {
         let there: BTreeSet<&str> = compared.iter().map(|line| of(line)).collect();
         let gone: Vec<&str> = names.iter().copied().filter(|name| !there.contains(name)).collect();
         if !gone.is_empty() {
