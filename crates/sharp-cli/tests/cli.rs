@@ -217,6 +217,22 @@ fn what_was_switched_off_is_named_in_report_and_plan() {
 }
 
 #[test]
+fn learning_curves_are_written_where_they_are_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let learn = |extra: &[&str]| {
+        let args = ["--json", "baseline", "sac", "rooms.yaml", "--episodes", "1", "--max-env-steps", "150"];
+        json(&sharp(folder.path(), &[&args[..], &ACROSS[..4], extra].concat()))
+    };
+    let report = learn(&["--tensorboard", "curves"]);
+    assert_eq!(report["env_steps"], 150, "{report}");
+    assert_eq!(fs::read_dir(folder.path().join("curves/sac")).unwrap().count(), 1, "one event file");
+    let again = learn(&[]);
+    assert_eq!(again["successes"], report["successes"], "watching changes nothing");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3, "map, image and curves: {again}");
+}
+
+#[test]
 fn serve_answers_every_line() {
     let folder = tempfile::tempdir().unwrap();
     write_rooms(folder.path(), true);
