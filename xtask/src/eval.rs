@@ -29,6 +29,14 @@ fn call(args: &[String]) -> Vec<String> {
     call
 }
 
+/// `args`, and those of `usual` whose flag is not among them.
+pub(crate) fn with_usual(args: &[String], usual: &[(&str, &str)]) -> Vec<String> {
+    let absent = usual.iter().filter(|(name, _)| flag(args, name).is_none());
+    let mut all = args.to_vec();
+    all.extend(absent.flat_map(|(name, value)| [(*name).to_owned(), (*value).to_owned()]));
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,5 +54,14 @@ mod tests {
         ] {
             assert_eq!(call(&words(args)), words(expected), "{args}");
         }
+    }
+
+    #[test]
+    fn what_is_usual_gives_way_to_what_is_asked() {
+        let usual = [("--noise", "none,harsh"), ("--out", "out/baselines")];
+        assert_eq!(
+            with_usual(&words("--out=here --envs a"), &usual),
+            words("--out=here --envs a --noise none,harsh")
+        );
     }
 }

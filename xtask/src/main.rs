@@ -33,8 +33,7 @@ usage: cargo xtask COMMAND
   train-prior [ARGS]     sharp prior train ARGS, for both robots by default
   eval [--profile smoke|quick|paper] [ARGS]
                          sharp eval of that suite
-  baselines [--noise N,..] [--methods M,..] [--envs E,..] [--episodes N] [--out DIR]
-                         sharp baseline on every problem, as tables; goes on where it was
+  baselines [ARGS]       sharp eval of every baseline on every problem under every noise
   bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
   bench peers [sim|learning|regions]
                          the same work here and in other programs, as JSON lines

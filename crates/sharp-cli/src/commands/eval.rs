@@ -2,14 +2,14 @@
 //!
 //! Planning, running and merging of jobs in one call: what it leaves is what `sharp jobs` leaves.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::args::{Engine, Eval};
 use crate::evaluation::{self, Evaluation, ResultLine, read_baselines, row_text};
 use crate::jobs::{
-    Cluster, Job, Manifest, Submission, clean, command, count_results, is_queued, merge, run_jobs, specs,
-    unfinished,
+    Cluster, Job, Manifest, Merged, Submission, clean, command, count_results, is_queued, merge, run_jobs,
+    specs, unfinished,
 };
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{bar, is_interrupted};
@@ -20,8 +20,8 @@ const ROUNDS: usize = 3;
 const LOOK: Duration = Duration::from_secs(2);
 
 pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let extra = baselines(args)?;
-    let command = full_command(args, seed);
+    let extra = args.baselines.as_deref().map(read_baselines).transpose()?.unwrap_or_default();
+    let command = command("eval", &args.selection, seed) + &format!(" --out {}", args.out.display());
     let (manifest, indices) = Manifest::extend(&args.out, specs(&args.selection, seed)?, &command)?;
     match args.engine {
         Engine::Local => run_here(args, &manifest, &indices),
@@ -31,12 +31,9 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
     if is_interrupted() {
         return Ok(Exit::Interrupted);
     }
-    let wanted = |&&index: &&usize| &merged.results[index].1;
+    let page = write_report(&manifest, &merged, &extra)?;
     let lines: Vec<&ResultLine> =
-        indices.iter().flat_map(|index| wanted(&index)).map(|done| &done.line).collect();
-    // Everything in the folder: what other calls measured there belongs to the same page.
-    let all = merged.results.iter().flat_map(|(_, results)| results).map(|done| &done.line);
-    let page = write_report(&args.out, all.chain(&extra).collect(), command)?;
+        indices.iter().flat_map(|&index| &merged.results[index]).map(|done| &done.line).collect();
     if json {
         for line in &lines {
             say!("{}", to_json(line));
@@ -47,37 +44,30 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
         say!("results in {}, plans and pictures in {}", show(args, "results.jsonl"), show(args, "jobs"));
         say!("report in {}", page.display());
     }
-    if unfinished(&manifest).iter().any(|index| indices.contains(index)) {
+    if merged.missing.iter().any(|(index, _)| indices.contains(index)) {
         return Ok(Exit::Partial);
     }
     clean(&manifest);
     Ok(Exit::Done)
 }
 
-/// Writes the report of `lines`; returns its page.
+/// Writes the report of everything in the folder of `manifest`, and of `extra` baselines; returns its page.
 ///
 /// # Errors
 /// Returns an error if it cannot be written.
-pub(super) fn write_report(out: &Path, lines: Vec<&ResultLine>, command: String) -> Result<PathBuf, Failure> {
-    evaluation::write(&Evaluation { lines, command, out })
+pub(super) fn write_report(
+    manifest: &Manifest,
+    merged: &Merged,
+    extra: &[ResultLine],
+) -> Result<PathBuf, Failure> {
+    let lines = merged.lines().chain(extra).collect();
+    let mut commands: Vec<&str> = manifest.jobs.iter().map(|job| job.command.as_str()).collect();
+    commands.dedup();
+    evaluation::write(&Evaluation { lines, command: commands.join("\n"), out: &manifest.dir })
 }
 
 fn show(args: &Eval, name: &str) -> String {
     args.out.join(name).display().to_string()
-}
-
-/// The baselines that another run measured.
-fn baselines(args: &Eval) -> Result<Vec<ResultLine>, Failure> {
-    Ok(args.baselines.as_deref().map(read_baselines).transpose()?.unwrap_or_default())
-}
-
-/// The call that gives the same results and the same report.
-fn full_command(args: &Eval, seed: u64) -> String {
-    let mut text = command("eval", &args.selection, seed);
-    if let Some(path) = &args.baselines {
-        text += &format!(" --baselines {}", path.display());
-    }
-    text + &format!(" --out {}", args.out.display())
 }
 
 /// Does the jobs on threads of this process; those that fail are told and left unfinished.
@@ -122,22 +112,4 @@ fn run_on_cluster(manifest: &Manifest, indices: &[usize]) -> Result<(), Failure>
     }
     progress.finish_and_clear();
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::Parser;
-
-    use super::*;
-    use crate::args::{Cli, Command};
-
-    #[test]
-    fn the_command_of_a_report_says_everything_that_decides_it() {
-        let text = "sharp --seed 7 eval quick --episodes 50 --noise harsh,none --regions grid --recovery off \
-                    --cost-update on --time-limit 60 --learning fast,paper --envs a,b --options interface \
-                    --problems 1,3 --methods sharp,rrt-contact --trials 2 --baselines here.jsonl --out here";
-        let cli = Cli::parse_from(text.split_whitespace());
-        let Command::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
-        assert_eq!(full_command(args, cli.seed), text);
-    }
 }

@@ -89,18 +89,15 @@ fn parse_block(text: &str) -> Option<Range<usize>> {
 fn merge_all(dir: &Path) -> Result<Exit, Failure> {
     let manifest = Manifest::open(dir)?;
     let merged = merge(&manifest)?;
-    for failure in &merged.missing {
+    for (_, failure) in &merged.missing {
         eprintln!("error: {failure}");
     }
-    let results = merged.results.iter().flat_map(|(_, results)| results);
-    let lines: Vec<&ResultLine> = results.map(|done| &done.line).collect();
-    let count = lines.len();
-    let mut commands: Vec<&str> = manifest.jobs.iter().map(|job| job.command.as_str()).collect();
-    commands.dedup();
-    let page = write_report(dir, lines, commands.join("\n"))?;
+    let page = write_report(&manifest, &merged, &[])?;
     say!(
-        "{count} results of {} jobs in {}, report in {}",
+        "{} results of {} whole jobs of {} in {}, report in {}",
+        merged.lines().count(),
         manifest.jobs.len() - merged.missing.len(),
+        manifest.jobs.len(),
         dir.join("results.jsonl").display(),
         page.display()
     );

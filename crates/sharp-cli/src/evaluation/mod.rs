@@ -1,7 +1,7 @@
 //! What a suite of problems came to: its lines, its tables, its figures and one page with all of them.
 //!
-//! Everything here is a function of `results.jsonl`, of the pictures beside the plans and, where given,
-//! of what `cargo xtask baselines` measured: equal results give equal bytes.
+//! Everything here is a function of `results.jsonl` and of the pictures beside the plans: equal results
+//! give equal bytes.
 
 mod ablations;
 mod calibration;
@@ -9,6 +9,7 @@ mod cases;
 mod figure;
 mod gallery;
 mod lines;
+mod methods;
 mod missing;
 mod noise;
 mod ompl;
@@ -43,8 +44,8 @@ pub(crate) struct Evaluation<'a> {
     pub(crate) out: &'a Path,
 }
 
-/// Writes `tables.md`, `ompl.log`, every figure as SVG and PNG, every picture as PNG, and `index.html` into
-/// `OUT/report`; returns the path of the page.
+/// Writes `tables.md`, `methods.md`, `ompl.log`, every figure as SVG and PNG, every picture as PNG, and
+/// `index.html` into `OUT/report`; returns the path of the page.
 ///
 /// # Errors
 /// Returns an error if a picture of a plan cannot be read or a file cannot be written.
@@ -61,6 +62,7 @@ pub(crate) fn write(evaluation: &Evaluation<'_>) -> Result<PathBuf, Failure> {
     for picture in galleries.iter().flat_map(|gallery| &gallery.pictures) {
         write_atomic(&folder.join(format!("{}.png", picture.name)), &picture.png)?;
     }
+    write_atomic(&folder.join("methods.md"), methods::tables(&results.lines).as_bytes())?;
     write_atomic(&folder.join("ompl.log"), ompl::log(&results.lines).as_bytes())?;
     let missing = missing::missing(&results, evaluation.out);
     write_atomic(&folder.join("tables.md"), tables::document(&results, &figures).as_bytes())?;

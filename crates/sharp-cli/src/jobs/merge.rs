@@ -7,15 +7,23 @@ use sharp_plan::write_atomic;
 use super::manifest::{Job, Manifest};
 use super::step::{Done, UNFINISHED};
 use super::work::steps;
+use crate::evaluation::ResultLine;
 use crate::outcome::Failure;
 
 /// All results that are there, and the jobs that are not whole.
 #[derive(Debug)]
 pub(crate) struct Merged {
     /// By job, each with its problems in order.
-    pub(crate) results: Vec<(usize, Vec<Done>)>,
-    /// What is wrong with each job that is not whole.
-    pub(crate) missing: Vec<Failure>,
+    pub(crate) results: Vec<Vec<Done>>,
+    /// The jobs that are not whole, and what is wrong with them.
+    pub(crate) missing: Vec<(usize, Failure)>,
+}
+
+impl Merged {
+    /// All results, in the order of the manifest.
+    pub(crate) fn lines(&self) -> impl Iterator<Item = &ResultLine> {
+        self.results.iter().flatten().map(|done| &done.line)
+    }
 }
 
 /// Reads and verifies every result of `manifest` and writes those that are there to `results.jsonl`, in
@@ -27,11 +35,10 @@ pub(crate) fn merge(manifest: &Manifest) -> Result<Merged, Failure> {
     let mut merged = Merged { results: vec![], missing: vec![] };
     for job in &manifest.jobs {
         let (results, missing) = collect(manifest, job);
-        merged.results.push((job.index, results));
-        merged.missing.extend(missing);
+        merged.results.push(results);
+        merged.missing.extend(missing.map(|failure| (job.index, failure)));
     }
-    let lines = merged.results.iter().flat_map(|(_, results)| results);
-    let text: String = lines.map(|done| format!("{}\n", done.text)).collect();
+    let text: String = merged.results.iter().flatten().map(|done| format!("{}\n", done.text)).collect();
     write_atomic(&manifest.dir.join("results.jsonl"), text.as_bytes())?;
     Ok(merged)
 }

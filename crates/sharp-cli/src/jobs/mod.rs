@@ -20,7 +20,7 @@ mod work;
 
 pub(crate) use local::run_jobs;
 pub(crate) use manifest::{Job, Manifest};
-pub(crate) use merge::{clean, count_results, merge, unfinished};
+pub(crate) use merge::{Merged, clean, count_results, merge, unfinished};
 pub(crate) use slurm::{Cluster, Submission, is_queued};
 pub(crate) use suite::{command, specs};
 pub(crate) use work::{Ended, run_job};

@@ -185,6 +185,16 @@ mod tests {
     }
 
     #[test]
+    fn the_call_of_a_job_says_everything_that_decides_it() {
+        let text = "sharp --seed 7 eval quick --episodes 50 --noise harsh,none --regions grid --recovery off \
+                    --cost-update on --time-limit 60 --learning fast,paper --envs a,b --options interface \
+                    --problems 1,3 --methods sharp,rrt-contact --trials 2";
+        let cli = Cli::parse_from(text.split_whitespace());
+        let Command::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
+        assert_eq!(command("eval", &args.selection, cli.seed), text);
+    }
+
+    #[test]
     fn suites_have_the_jobs_that_their_names_promise() {
         let count = |flags: &str| {
             let specs = specs_of(flags).expect("a suite");
