@@ -22,7 +22,12 @@ struct Shown {
     axis: fn(&[Case<'_>]) -> Axis,
     /// How the axis writes its values.
     tick: fn(f64) -> String,
+    /// Columns of the table behind those that name the case.
+    columns: &'static [Column],
 }
+
+/// A column: its name, and what a case has in it.
+type Column = (&'static str, fn(&Case<'_>) -> String);
 
 /// Time until there is something to drive with: the paper's figure of times.
 pub(super) fn time(name: &'static str, title: &'static str, lines: &[&ResultLine]) -> Figure {
@@ -37,6 +42,7 @@ pub(super) fn time(name: &'static str, title: &'static str, lines: &[&ResultLine
             Axis::decades(logs().fold(0.0, f64::min), logs().fold(0.0, f64::max))
         },
         tick: |log| plain(10_f64.powf(log)),
+        columns: &[("time s", |case| case.ready_s.text(2))],
     };
     let caption = "Wall time until there is a policy or a path, seconds, on a logarithmic axis; over several \
                    trials the mean with Student's 95 % interval. SHARP: everything that sharp solve does, \
@@ -53,6 +59,10 @@ pub(super) fn success(name: &'static str, title: &'static str, lines: &[&ResultL
         number: |case| format!("{}/{}", case.tally.successes, case.tally.episodes),
         axis: |_| Axis::of_shares(),
         tick: percent,
+        columns: &[
+            ("success", |case| format!("{}/{}", case.tally.successes, case.tally.episodes)),
+            ("95 % interval", |case| format!("{:.3}-{:.3}", case.tally.lower95(), case.tally.upper95())),
+        ],
     };
     let caption = "Share of executions, of all trials together, that reached the goal without touching a wall, \
                    with Wilson's 95 % interval; a problem without a plan counts as failed. Only RRT with \
@@ -70,6 +80,7 @@ pub(super) fn driving(lines: &[&ResultLine]) -> Figure {
             Axis::from_zero(times.map(|time| time.mean).fold(0.0, f64::max))
         },
         tick: plain,
+        columns: &[("driving s", |case| case.driving_s.map_or_else(|| "-".to_owned(), |time| time.text(1)))],
     };
     let caption = "Mean simulated time of the executions that reached the goal, seconds; over several trials \
                    with Student's 95 % interval. A method that fails on the long ways looks quicker than it \
@@ -91,7 +102,7 @@ fn figure(
         caption: caption.to_owned(),
         legend: legend(cases.iter().map(|case| case.method)),
         panels: cases.chunk_by(same).map(|cases| panel(cases, shown)).collect(),
-        table: table(&cases),
+        table: table(&cases, shown.columns),
     }
 }
 
@@ -124,30 +135,19 @@ fn mark(panel: &mut Panel, case: &Case<'_>, shown: &Shown, axis: &Axis, y: f64) 
     panel.chart.text([RIGHT + 8.0, y + 4.0], Anchor::Start, TEXT, INK, (shown.number)(case));
 }
 
-fn table(cases: &[Case<'_>]) -> Table {
-    let columns = vec![
-        "env",
-        "robot",
-        "problem",
-        "method",
-        "trials",
-        "success",
-        "95 % interval",
-        "time s",
-        "driving s",
-    ];
+fn table(cases: &[Case<'_>], more: &[Column]) -> Table {
+    let mut columns = vec!["env", "robot", "problem", "method", "trials"];
+    columns.extend(more.iter().map(|(name, _)| name));
     let row = |case: &Case<'_>| {
-        vec![
+        let mut row = vec![
             case.env.to_owned(),
             case.robot.to_owned(),
             format!("P{}", case.problem),
             label(case.method),
             case.trials.to_string(),
-            format!("{}/{}", case.tally.successes, case.tally.episodes),
-            format!("{:.3}-{:.3}", case.tally.lower95(), case.tally.upper95()),
-            case.ready_s.text(2),
-            case.driving_s.map_or_else(|| "-".to_owned(), |time| time.text(1)),
-        ]
+        ];
+        row.extend(more.iter().map(|(_, of)| of(case)));
+        row
     };
     Table { columns, rows: cases.iter().map(row).collect() }
 }
@@ -163,6 +163,8 @@ pub(super) fn label(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Lettering;
+    use crate::report::SolveTimes;
 
     fn baseline(successes: u32) -> ResultLine {
         let line = ResultLine::example("a", "limo", "none", 1);
@@ -177,10 +179,7 @@ mod tests {
         let rows: Vec<String> = figure.table.rows.iter().map(|row| row.join(" ")).collect();
         assert_eq!(
             rows,
-            [
-                "a limo P1 SHARP interface 1 20/20 0.839-1.000 5.00 25.0",
-                "a limo P1 RRT 1 5/20 0.112-0.469 3.00 12.5"
-            ]
+            ["a limo P1 SHARP interface 1 20/20 0.839-1.000", "a limo P1 RRT 1 5/20 0.112-0.469"]
         );
         assert_eq!(figure.panels.len(), 1, "one environment, one robot");
     }
@@ -210,7 +209,4 @@ mod tests {
             assert!(svg.contains(tick), "no {tick} in {svg}");
         }
     }
-
-    use crate::render::Lettering;
-    use crate::report::SolveTimes;
 }

@@ -27,8 +27,11 @@ fn markdown(table: &Table) -> String {
     text
 }
 
+/// A column: its name, and what a result has in it.
+type Column = (&'static str, fn(&ResultLine) -> String);
+
 /// What a result of SHARP may differ in besides its problem.
-const SETTINGS: [(&str, fn(&ResultLine) -> String); 6] = [
+const SETTINGS: [Column; 6] = [
     ("learning", |line| line.learning.clone()),
     ("regions", |line| line.regions.clone()),
     ("noise", |line| line.noise.clone()),
@@ -39,8 +42,8 @@ const SETTINGS: [(&str, fn(&ResultLine) -> String); 6] = [
 
 /// One row a result, with a column for every setting in which some of them differ.
 pub(crate) fn table(lines: &[&ResultLine]) -> String {
-    let differs = |of: &fn(&ResultLine) -> String| lines.windows(2).any(|pair| of(pair[0]) != of(pair[1]));
-    let settings: Vec<_> = SETTINGS.into_iter().filter(|(_, of)| differs(of)).collect();
+    let differs = |(_, of): &Column| lines.windows(2).any(|pair| of(pair[0]) != of(pair[1]));
+    let settings: Vec<Column> = SETTINGS.into_iter().filter(differs).collect();
     let mut columns = vec!["env", "problem", "robot", "options"];
     columns.extend(settings.iter().map(|(name, _)| name));
     columns.extend(["success", "95 % interval", "predicted", "reused", "driving s", "regions s"]);
