@@ -179,7 +179,8 @@ pub(super) fn marker(chart: &mut Chart, at: [f64; 2], style: &Style, hollow: boo
 
 /// A number of seconds, short.
 pub(super) fn seconds(value: f64) -> String {
-    if value >= 100.0 { format!("{value:.0} s") } else { format!("{value:.1} s") }
+    let decimals = if value >= 100.0 { 0 } else { usize::from(value < 1.0) + 1 };
+    format!("{value:.decimals$} s")
 }
 
 /// A number as it would be said, without what rounding left.
@@ -269,6 +270,11 @@ mod tests {
             let texts: Vec<String> = axis.ticks().into_iter().map(plain).collect();
             assert_eq!(texts.join(" "), ticks, "{most}: {axis:?}");
         }
+    }
+
+    #[test]
+    fn times_have_as_many_decimals_as_their_size_deserves() {
+        assert_eq!([0.042, 1.0, 99.94, 213.4].map(seconds), ["0.04 s", "1.0 s", "99.9 s", "213 s"]);
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub(super) fn figure(results: &Results<'_>) -> Option<Figure> {
     };
     Some(Figure {
         name: "noise",
-        title: "Noise, from none to four times nominal",
+        title: "Success and noise",
         caption: "Success over all problems that a method was measured on at every level of noise, with Wilson's \
                   95 % interval. Policies are learnt and verified under the noise that they are driven in. Marks \
                   of methods stand side by side."

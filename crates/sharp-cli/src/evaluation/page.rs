@@ -129,7 +129,9 @@ fn table(table: &Table) -> String {
         let row: String = cells.map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect();
         format!("<tr>{row}</tr>\n")
     };
-    let mut html = String::from("<details>\n<summary>The numbers</summary>\n<div class=\"wide\"><table>\n");
+    let mut html = String::from(
+        "<details>\n<summary>The numbers</summary>\n<div class=\"wide\" tabindex=\"0\"><table>\n",
+    );
     html += &cells("th", &mut table.columns.iter().copied());
     for row in &table.rows {
         html += &cells("td", &mut row.iter().map(String::as_str));
