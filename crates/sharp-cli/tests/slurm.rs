@@ -9,7 +9,7 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -106,13 +106,13 @@ impl Cluster {
     }
 
     /// Starts the daemon of the node again.
-    fn boot(&self) {
+    fn boot(&self) -> Child {
         let host = Command::new("hostname").arg("-s").output().expect("hostname runs").stdout;
         let host = String::from_utf8_lossy(&host).trim().to_owned();
         let conf = self.conf().display().to_string();
         let mut daemon = self.command("setsid", &["/usr/sbin/slurmd", "-D", "-f", &conf, "-N", &host]);
         daemon.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-        daemon.spawn().expect("slurmd runs");
+        daemon.spawn().expect("slurmd runs")
     }
 }
 
@@ -164,7 +164,7 @@ fn a_cluster_that_loses_tasks_ends_with_the_results_of_one_machine() {
         Ok(cluster) => cluster,
         Err(missing) => return println!("skipped: {missing}"),
     };
-    let folder = cluster.root.path();
+    let folder = cluster.root.path().to_owned();
     let plan = cluster.sharp(&[&["jobs", "plan"], &SUITE[..], &["slurm"]].concat());
     assert_eq!(plan.status.code(), Some(0), "{plan:?}");
     let array = cluster.submit();
@@ -181,7 +181,7 @@ fn a_cluster_that_loses_tasks_ends_with_the_results_of_one_machine() {
 
     sleep(Duration::from_millis(500));
     cluster.crash(again);
-    cluster.boot();
+    let mut daemon = cluster.boot();
     cluster.payload(1, &[interrupted, again]);
     wait_for("the array", || (!cluster.is_queued(&array)).then_some(()));
     let early = cluster.sharp(&["jobs", "merge", "slurm"]);
@@ -200,4 +200,6 @@ fn a_cluster_that_loses_tasks_ends_with_the_results_of_one_machine() {
     assert_eq!(local.status.code(), Some(0), "{local:?}");
     assert_eq!(results(&folder.join("slurm")), results(&folder.join("local")), "on the cluster, and here");
     assert_eq!(cluster.sharp(&["jobs", "merge", "slurm"]).status.code(), Some(0), "nothing is missing");
+    drop(cluster);
+    daemon.wait().expect("the daemon of the node has been stopped");
 }
