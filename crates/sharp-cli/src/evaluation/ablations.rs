@@ -7,7 +7,7 @@ use super::figure::{
     Axis, Figure, INK, Panel, RIGHT, SOFT, Style, TEXT, TOP, Table, legend, marker, percent, plain, seconds,
 };
 use super::lines::ResultLine;
-use crate::render::Anchor;
+use crate::render::{Anchor, Chart};
 
 const ROW: f64 = 13.0;
 const HEADER: f64 = 20.0;
@@ -157,6 +157,9 @@ fn panel(
     axis.draw(&mut panel.chart, [TOP, bottom], tick);
     let mut top = TOP;
     for group in groups {
+        // The rules of the axis shall not cross the words.
+        let width = Chart::text_width(group[0].name, TEXT) + 6.0;
+        panel.chart.rect([0.0, top + 4.0], [width, HEADER - 6.0], "#fff");
         panel.chart.text([0.0, top + 15.0], Anchor::Start, TEXT, SOFT, group[0].name);
         top += HEADER;
         for row in group {
