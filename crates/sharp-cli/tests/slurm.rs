@@ -4,6 +4,7 @@
 //! the folder it is given; a script `down.sh` beside it stops that cluster. Elsewhere the test says
 //! that it skips.
 
+#![cfg(unix)]
 #![allow(clippy::disallowed_methods, reason = "a cluster is found in the environment and waited for")]
 
 use std::fs;

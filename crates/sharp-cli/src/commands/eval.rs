@@ -16,6 +16,8 @@ use crate::progress::{bar, is_interrupted};
 
 /// Times that jobs which a cluster lost are submitted.
 const ROUNDS: usize = 3;
+/// Expected length of a task, seconds.
+const PACK_S: f64 = 600.0;
 /// Between two looks at the queue.
 const LOOK: Duration = Duration::from_secs(2);
 
@@ -29,6 +31,7 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
     }
     let merged = merge(&manifest)?;
     if is_interrupted() {
+        eprintln!("interrupted; the same call goes on with {} results", merged.lines().count());
         return Ok(Exit::Interrupted);
     }
     let page = write_report(&manifest, &merged, &extra)?;
@@ -40,7 +43,7 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
         }
     } else {
         let of_sharp: Vec<&ResultLine> = lines.iter().copied().filter(|line| line.is_of_sharp()).collect();
-        say!("{}", evaluation::table(&of_sharp));
+        say!("{}\n{}", evaluation::table(&of_sharp), evaluation::totals(&lines));
         say!("results in {}, plans and pictures in {}", show(args, "results.jsonl"), show(args, "jobs"));
         say!("report in {}", page.display());
     }
@@ -89,7 +92,10 @@ fn run_here(args: &Eval, manifest: &Manifest, indices: &[usize]) {
 
 /// Submits what is not finished, waits, and submits again what the cluster lost.
 fn run_on_cluster(manifest: &Manifest, indices: &[usize]) -> Result<(), Failure> {
-    let submission = Submission { array_limit: None, time_min: None, pack_s: 600.0, sbatch: vec![] };
+    let weight_s: f64 = indices.iter().map(|&index| manifest.jobs[index].weight_s).sum();
+    // Tasks of minutes, but some of them even for a small suite.
+    let pack_s = PACK_S.min(weight_s / 16.0);
+    let submission = Submission { array_limit: None, time_min: None, pack_s, sbatch: vec![] };
     let steps: usize = indices.iter().map(|&index| manifest.jobs[index].spec.problems.len()).sum();
     let progress = bar(steps as u64, "evaluating");
     for _ in 0..ROUNDS {

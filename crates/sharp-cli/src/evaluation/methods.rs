@@ -43,7 +43,7 @@ impl Sum {
 /// The tables of `lines`.
 pub(super) fn tables(lines: &[&ResultLine]) -> String {
     let noises = distinct(lines.iter().map(|line| line.noise.clone()));
-    let mut text = totals(lines, &noises);
+    let mut text = totals(lines);
     for method in distinct(lines.iter().map(|line| label(line))) {
         let of_method: Vec<&ResultLine> =
             lines.iter().copied().filter(|line| label(line) == method).collect();
@@ -52,33 +52,14 @@ pub(super) fn tables(lines: &[&ResultLine]) -> String {
     text
 }
 
-/// Each of `items` once, in the order in which they come.
-fn distinct(items: impl Iterator<Item = String>) -> Vec<String> {
-    items.fold(Vec::new(), |mut seen, item| {
-        if !seen.contains(&item) {
-            seen.push(item);
-        }
-        seen
-    })
-}
-
-/// The name of a baseline, or SHARP with all that is not as usual.
-fn label(line: &ResultLine) -> String {
-    if !line.is_of_sharp() {
-        return line.method.clone();
-    }
-    let usual = default_regions();
-    let unusual = [(&line.learning, "fast"), (&line.regions, &usual), (&line.variant, "default")];
-    let words = unusual.into_iter().filter(|(word, usual)| word != usual).map(|(word, _)| word.as_str());
-    ["sharp", &line.options].into_iter().chain(words).collect::<Vec<_>>().join(" ")
-}
-
-fn totals(lines: &[&ResultLine], noises: &[String]) -> String {
+/// One row for each method, noise and robot.
+pub(crate) fn totals(lines: &[&ResultLine]) -> String {
+    let noises = distinct(lines.iter().map(|line| line.noise.clone()));
     let mut text = String::from(
         "| method | noise | robot | success | 95 % interval | collisions | timeouts | driving s | ready after s | decision us |\n|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for method in distinct(lines.iter().map(|line| label(line))) {
-        for noise in noises {
+        for noise in &noises {
             let mut sums: BTreeMap<&str, Sum> = BTreeMap::new();
             for line in lines.iter().filter(|line| label(line) == method && line.noise == *noise) {
                 sums.entry(&line.robot).or_default().add(line);
@@ -103,6 +84,27 @@ fn totals(lines: &[&ResultLine], noises: &[String]) -> String {
         }
     }
     text
+}
+
+/// Each of `items` once, in the order in which they come.
+fn distinct(items: impl Iterator<Item = String>) -> Vec<String> {
+    items.fold(Vec::new(), |mut seen, item| {
+        if !seen.contains(&item) {
+            seen.push(item);
+        }
+        seen
+    })
+}
+
+/// The name of a baseline, or SHARP with all that is not as usual.
+fn label(line: &ResultLine) -> String {
+    if !line.is_of_sharp() {
+        return line.method.clone();
+    }
+    let usual = default_regions();
+    let unusual = [(&line.learning, "fast"), (&line.regions, &usual), (&line.variant, "default")];
+    let words = unusual.into_iter().filter(|(word, usual)| word != usual).map(|(word, _)| word.as_str());
+    ["sharp", &line.options].into_iter().chain(words).collect::<Vec<_>>().join(" ")
 }
 
 /// Rows are environments and robots, columns noises.

@@ -31,6 +31,7 @@ use crate::render::svg_to_png;
 pub(crate) use lines::{
     Machine, ResultLine, default_regions, problem_folder, read_baselines, row_text, variant,
 };
+pub(crate) use methods::totals;
 pub(crate) use tables::table;
 
 /// What a report is made from.

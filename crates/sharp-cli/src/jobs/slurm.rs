@@ -58,6 +58,9 @@ impl Cluster {
         let dir = absolute(&manifest.dir).context("the folder of the jobs has no path")?;
         let program = std::env::current_exe().context("this program has no path")?;
         let jobs: Vec<&Job> = indices.iter().map(|&index| &manifest.jobs[index]).collect();
+        if let Some(minutes) = submission.time_min {
+            check_time(&jobs, minutes)?;
+        }
         let blocks = blocks(&jobs, submission.pack_s);
         let folder = dir.join("slurm");
         let (array, merge) = (folder.join("array.sh"), folder.join("merge.sh"));
@@ -114,6 +117,24 @@ pub(crate) fn is_queued(id: &str) -> Result<bool, Failure> {
     // because the controller is away says so otherwise.
     let text = String::from_utf8_lossy(&output.stderr);
     Ok(if output.status.success() { !output.stdout.is_empty() } else { !text.contains("Invalid job id") })
+}
+
+/// A problem is done whole or again: a task must have time for one, or it would begin it for ever.
+fn check_time(jobs: &[&Job], minutes: u32) -> Result<(), Failure> {
+    let problem_s = |job: &&&Job| job.weight_s / job.spec.problems.len().max(1) as f64;
+    let Some(longest) = jobs.iter().max_by(|a, b| problem_s(a).total_cmp(&problem_s(b))) else {
+        return Ok(());
+    };
+    let needed_s = problem_s(&longest) + f64::from(WARNING_S);
+    if 60.0 * f64::from(minutes) > needed_s {
+        return Ok(());
+    }
+    let name = &longest.name;
+    let message = format!(
+        "--time is {minutes}, a problem of job {name} is expected to take {:.0} minutes",
+        (needed_s / 60.0).ceil()
+    );
+    Err(Failure::new("USAGE", message))
 }
 
 /// Ranges of consecutive jobs, each expected to take `pack_s` at least if there are enough.
@@ -205,6 +226,17 @@ mod tests {
         assert_eq!(blocks(&jobs, 1e9), [0..3, 4..7], "all fit");
         assert_eq!(blocks(&jobs, 0.0).len(), 6, "none fits with another");
         assert!(blocks(&[], 1.0).is_empty(), "nothing to do");
+    }
+
+    #[test]
+    fn a_task_has_time_for_one_problem_at_least() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut manifest = manifest(folder.path(), 1);
+        manifest.jobs[0].weight_s = 2.0 * 2400.0;
+        let jobs: Vec<&Job> = manifest.jobs.iter().collect();
+        assert!(check_time(&jobs, 41).is_ok(), "two problems of 40 minutes, one after the other");
+        let message = check_time(&jobs, 40).expect_err("too short").to_string();
+        assert!(message.ends_with("is expected to take 41 minutes"), "{message}");
     }
 
     #[test]

@@ -19,32 +19,56 @@ pub(crate) fn specs(selection: &Selection, seed: u64) -> Result<Vec<Spec>, Failu
         for robot in chosen("--robots", &selection.robots, robots(selection.suite))? {
             for noise in &selection.noise {
                 let inputs = Inputs::read(&env, &robot, noise, Some(&selection.regions))?;
-                for trial in
-                    0..selection.trials.unwrap_or(if selection.suite == Suite::Paper { 5 } else { 1 })
-                {
-                    let spec = |(method, sharp): (Contender, Option<SharpSpec>)| Spec {
-                        version: env!("CARGO_PKG_VERSION").to_owned(),
-                        env: env.clone(),
-                        robot: robot.clone(),
-                        method,
-                        inputs: Inputs {
-                            regions: inputs.regions.clone().filter(|_| sharp.is_some()),
-                            ..inputs.clone()
-                        },
-                        sharp,
-                        noise: noise.clone(),
-                        trial,
-                        seed: trial_seed(seed, trial),
-                        episodes: selection.episodes,
-                        problems: problems.clone(),
-                        time_limit_s: selection.time_limit,
-                    };
-                    specs.extend(contenders(selection).into_iter().map(spec));
-                }
+                let world = World { env: &env, robot: &robot, noise, problems: &problems, inputs };
+                specs.extend(world.specs(selection, seed));
             }
         }
     }
     Ok(specs)
+}
+
+/// Where all methods are measured beside each other.
+struct World<'a> {
+    env: &'a str,
+    robot: &'a str,
+    noise: &'a str,
+    problems: &'a [usize],
+    inputs: Inputs,
+}
+
+impl World<'_> {
+    /// All methods in each trial.
+    fn specs(&self, selection: &Selection, seed: u64) -> Vec<Spec> {
+        let trials = selection.trials.unwrap_or(if selection.suite == Suite::Paper { 5 } else { 1 });
+        let methods = contenders(selection);
+        let all = (0..trials).flat_map(|trial| methods.iter().map(move |method| (trial, method)));
+        all.map(|(trial, (method, sharp))| self.spec(selection, (trial, seed), *method, sharp.clone()))
+            .collect()
+    }
+
+    fn spec(
+        &self,
+        selection: &Selection,
+        (trial, seed): (u32, u64),
+        method: Contender,
+        sharp: Option<SharpSpec>,
+    ) -> Spec {
+        let regions = self.inputs.regions.clone().filter(|_| sharp.is_some());
+        Spec {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            env: self.env.to_owned(),
+            robot: self.robot.to_owned(),
+            method,
+            sharp,
+            noise: self.noise.to_owned(),
+            trial,
+            seed: trial_seed(seed, trial),
+            episodes: selection.episodes,
+            problems: self.problems.to_vec(),
+            time_limit_s: selection.time_limit,
+            inputs: Inputs { regions, ..self.inputs.clone() },
+        }
+    }
 }
 
 /// The call of `sharp SUBCOMMAND` that asks for the same jobs.
