@@ -101,10 +101,14 @@ fn figures(results: &Results<'_>) -> Vec<Figure> {
 }
 
 #[cfg(test)]
+mod browser;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
-    fn evaluate(lines: &[ResultLine], out: &Path) -> String {
+    /// Writes the report of `lines` and returns its page.
+    pub(super) fn evaluate(lines: &[ResultLine], out: &Path) -> String {
         let evaluation = Evaluation {
             lines: lines.iter().collect(),
             command: "sharp eval \"quick\" --out <here>".into(),
@@ -115,7 +119,7 @@ mod tests {
     }
 
     /// What a whole evaluation leaves, one line of each sort.
-    fn whole() -> Vec<ResultLine> {
+    pub(super) fn whole() -> Vec<ResultLine> {
         let line = ResultLine::example("a", "husky", "interface", 1);
         let mut lines = lines();
         lines.extend([
