@@ -76,6 +76,7 @@ fn plan_folder(world: &World, settings: &SolveSettings, threads: usize) -> TempD
         abstraction: world.abstraction.clone(),
         noise: settings.noise.clone(),
         learning: settings.learn.mode,
+        cost_update: settings.search.cost_update,
         seed: settings.seed,
         solution,
     };

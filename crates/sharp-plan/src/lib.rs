@@ -39,7 +39,7 @@ pub use certify::{Certificate, Trial};
 pub use composed::{ComposedPolicy, Decision, Events};
 pub use execute::{Episode, EpisodeEnd, RunSettings, run, success};
 pub use files::{FileError, hash, read_ron, write_atomic, write_ron};
-pub use learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson, RewardMode};
+pub use learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson, LessonMonitor, RewardMode};
 pub use leg::{Leg, LegId, Role, Target};
 pub use library::{FORMAT, OptionLibrary, StoredOption};
 pub use pace::{PacedFollower, SpeedRule};

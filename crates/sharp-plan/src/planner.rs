@@ -55,6 +55,8 @@ pub struct SearchSettings {
     /// Seconds added to a first or last leg that passes a centroid by: no later problem can reuse it,
     /// and the paper knows no such leg.
     pub shortcut_surcharge_s: f64,
+    /// Learnt legs cost what was measured of them (line 18 of Algorithm 1); false keeps the first costs.
+    pub cost_update: bool,
     /// Largest turn between two guides that a robot which turns in place takes in its stride, radians.
     pub smooth_turn_rad: f64,
     /// How guides are planned.
@@ -69,6 +71,7 @@ impl SearchSettings {
             nominal_speed_mps: 0.5 * workspace.robot.max_speed_mps,
             untrained_surcharge_s: 2.0,
             shortcut_surcharge_s: 6.0,
+            cost_update: true,
             // The footprint swings out in a turn: beyond 75 degrees it needs room or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),
             guide: GuideSettings::default(),
@@ -184,6 +187,7 @@ impl<'a> Planner<'a> {
         let least_s = straight_m / self.workspace.robot.max_speed_mps;
         let estimated = length_m / self.settings.nominal_speed_mps + self.settings.untrained_surcharge_s;
         let shortcut_s = if leg.is_shortcut { self.settings.shortcut_surcharge_s } else { 0.0 };
+        let measured = measured.filter(|_| self.settings.cost_update);
         measured.map_or(estimated, |seconds| seconds.max(least_s)) + shortcut_s
     }
 
@@ -338,6 +342,10 @@ mod tests {
         let slow = |id| (id == option).then_some(500.0);
         let second = planner(&world, query).plan(&slow, &()).expect("the other way");
         assert!(second.iter().all(|leg| leg.id != option), "{} uses the slow {option}", names(&second));
+        let settings = SearchSettings { cost_update: false, ..SearchSettings::new(&world.0) };
+        let planner = Planner::new(&world.0, &world.1, settings, query, [], Seed(1));
+        let third = planner.expect("both ends have a state").plan(&slow, &()).expect("the first way");
+        assert_eq!(names(&third), names(&first), "without the update nothing flows back");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use sharp_sim::RobotState;
 
-use super::{Run, certificate, tallies};
+use super::{LegMonitor, Run, certificate, tallies};
 use crate::certify::Certificate;
 use crate::files::FileError;
 use crate::learn::{LearnSettings, Learnt, Lesson};
@@ -144,7 +144,7 @@ impl Run<'_> {
         let lesson = Lesson { settings: &settings, next, tail, ..self.lesson(leg, starts, seed) };
         let old = &self.learnt[&leg.id];
         let present = lesson.judge(&old.policy);
-        let (judged, mut new) = lesson.learn_judged(&|| self.monitor.should_stop()).ok()?;
+        let (judged, mut new) = lesson.learn_judged(&LegMonitor { monitor: self.monitor, leg }).ok()?;
         new.env_steps += old.env_steps;
         new.gradient_steps += old.gradient_steps;
         (judged.tally.rate() - present.tally.rate() >= GAIN_MIN).then_some(new)
