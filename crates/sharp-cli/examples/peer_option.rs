@@ -1,9 +1,10 @@
-//! Our side of `cargo xtask bench peers option`: one option of a saved plan, learnt in several ways.
+//! Our side of `cargo xtask bench peers option`: the longest option of a saved plan, learnt in several
+//! ways.
 //!
-//! `peer_option MAP PLAN OPTION paper SEED LIMIT` learns it by the paper's protocol, `scratch` in the
-//! guide's frame from fresh networks, both for at most `LIMIT` seconds; `fast SEED` does what the
-//! default mode does. Each prints one JSON object. `serve SEED` is the task that `paper` learns, for
-//! another program: see [`serve`]. Whoever learns is judged by the same rule, see [`judge`].
+//! `peer_option MAP PLAN paper SEED LIMIT` learns it by the paper's protocol, `scratch` in the guide's
+//! frame from fresh networks, both for at most `LIMIT` seconds; `fast SEED` does what the default mode
+//! does. Each prints one JSON object. `serve SEED` is the task that `paper` learns, for another
+//! program: see [`serve`]. Whoever learns is judged by the same rule, see [`judge`].
 
 #![allow(
     clippy::disallowed_methods,
@@ -19,8 +20,8 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use sharp_guide::{PseudoReward, ShapedReward};
 use sharp_plan::{
-    Expectation, Form, LearnSettings, LearningMode, Leg, LegTask, Lesson, Plan, RewardMode, StartSpread,
-    Starts, prior,
+    Expectation, Form, LearnSettings, LearningMode, Leg, LegTask, Lesson, Plan, RewardMode, Role,
+    StartSpread, Starts, prior,
 };
 use sharp_rl::{
     Actor, Environment, Evaluation, SacSettings, StopRule, Stream, TrainError, TrainSettings, evaluate, train,
@@ -39,18 +40,20 @@ const STARTS: usize = 256;
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> Outcome<()> {
-    let usage = "usage: peer_option MAP PLAN OPTION paper|scratch SEED LIMIT | fast SEED | serve SEED";
+    let usage = "usage: peer_option MAP PLAN paper|scratch SEED LIMIT | fast SEED | serve SEED";
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [map, plan, option, rest @ ..] = &arguments[..] else { return Err(usage.into()) };
+    let [map, plan, rest @ ..] = &arguments[..] else { return Err(usage.into()) };
     let grid = sharp_maps::load(map, &sharp_maps::LoadOptions::default())?.grid;
-    let course = Course::new(Plan::load(Path::new(plan), grid)?, option)?;
-    let report = match rest.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+    let course = Course::new(Plan::load(Path::new(plan), grid)?)?;
+    let mut report = match rest.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["serve", seed] => return serve(course.paper_task(Seed(seed.parse()?)), Seed(seed.parse()?)),
         ["paper", seed, limit] => course.paper(Seed(seed.parse()?), limit.parse()?)?,
         ["scratch", seed, limit] => course.scratch(Seed(seed.parse()?), limit.parse()?)?,
         ["fast", seed] => course.fast(Seed(seed.parse()?))?,
         _ => return Err(usage.into()),
     };
+    report["option"] = json!(course.leg.id.to_string());
+    report["length_m"] = json!(course.leg.guide.length_m());
     println!("{report}");
     Ok(())
 }
@@ -64,11 +67,12 @@ struct Course {
 }
 
 impl Course {
-    fn new(plan: Plan, option: &str) -> Outcome<Self> {
+    fn new(plan: Plan) -> Outcome<Self> {
         let legs = &plan.solution.legs;
-        let names: Vec<String> = legs.iter().map(|planned| planned.leg.id.to_string()).collect();
-        let index = names.iter().position(|name| name == option);
-        let index = index.ok_or_else(|| format!("no leg is called {option}: {}", names.join(", ")))?;
+        let length_m = |index: &usize| legs[*index].leg.guide.length_m();
+        let options = (0..legs.len()).filter(|&index| legs[index].leg.id.role() == Role::Option);
+        let index = options.max_by(|a, b| length_m(a).total_cmp(&length_m(b)));
+        let index = index.ok_or("the plan has no option")?;
         let leg = Arc::clone(&legs[index].leg);
         let next = legs.get(index + 1).map(|planned| Arc::clone(&planned.leg));
         let starts = Starts::spread(&plan.workspace, &leg, &StartSpread::default(), STARTS, plan.seed);
