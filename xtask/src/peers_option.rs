@@ -35,7 +35,7 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     let threads: u32 = flag(args, "--peer-threads").unwrap_or("1").parse().context("--peer-threads")?;
     let sides = Sides {
         python: python(&folder(), "requirements-learning.txt")?,
-        plan: plan(flag(args, "--problem").unwrap_or("2"))?,
+        plan: plan(flag(args, "--problem").unwrap_or("4"))?,
         limit: limit.to_string(),
         threads: threads.to_string(),
     };
