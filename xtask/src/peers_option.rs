@@ -36,11 +36,11 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     let sides = Sides {
         python: python(&folder(), "requirements-learning.txt")?,
         plan: plan(flag(args, "--problem").unwrap_or("4"))?,
-        limit: limit.to_string(),
-        threads: threads.to_string(),
+        limit,
+        threads,
     };
     for seed in 1..=seeds {
-        for line in sides.compare(&seed.to_string())? {
+        for line in sides.compare(seed)? {
             if writeln!(std::io::stdout(), "{line}").is_err() {
                 // Whoever reads has read enough.
                 return Ok(0);
@@ -64,23 +64,24 @@ fn plan(problem: &str) -> anyhow::Result<PathBuf> {
 struct Sides {
     python: PathBuf,
     plan: PathBuf,
-    /// Seconds, as both sides read them.
-    limit: String,
-    threads: String,
+    /// Seconds that a side may take.
+    limit: f64,
+    threads: u32,
 }
 
 impl Sides {
-    fn compare(&self, seed: &str) -> anyhow::Result<[Value; 3]> {
+    fn compare(&self, seed: u64) -> anyhow::Result<[Value; 3]> {
+        let (name, limit) = (seed.to_string(), self.limit.to_string());
         eprintln!("seed {seed}: the paper's settings on both sides, load {}", load());
         let (paper, peer) = std::thread::scope(|scope| {
-            let paper = scope.spawn(|| self.ours(&["paper", seed, &self.limit]));
-            let peer = self.peer(seed);
+            let paper = scope.spawn(|| self.ours(&["paper", &name, &limit]));
+            let peer = self.peer(&[&name, &limit, &self.threads.to_string()]);
             (paper.join().expect("no panic, but an error"), peer)
         });
         let (paper, peer) = (paper?, peer?);
         eprintln!("seed {seed}: the guide's frame, load {}", load());
-        let scratch = self.ours(&["scratch", seed, &self.limit])?;
-        let fast = self.ours(&["fast", seed])?;
+        let scratch = self.ours(&["scratch", &name, &limit])?;
+        let fast = self.ours(&["fast", &name])?;
         let lines = [("", &paper), (".scratch", &scratch), (".fast", &fast)];
         Ok(lines.map(|(kind, ours)| {
             let mut line = line(&format!("option.time_to_95{kind}"), ours, &peer);
@@ -99,10 +100,11 @@ impl Sides {
         parse(std::str::from_utf8(&output.stdout).context("peer_option prints no text")?)
     }
 
-    fn peer(&self, seed: &str) -> anyhow::Result<Value> {
+    /// What the peer reports: seed, limit and threads are `args`.
+    fn peer(&self, args: &[&str]) -> anyhow::Result<Value> {
         let result = folder().join("option.json");
         let mut command = Command::new(&self.python);
-        command.arg(root().join("assets/peers/sb3_option.py")).args([seed, &self.limit, &self.threads]);
+        command.arg(root().join("assets/peers/sb3_option.py")).args(args);
         command.arg(&result).arg(self.example().get_program()).arg(MAP).arg(&self.plan);
         succeed(&mut command)?;
         parse(&fs::read_to_string(&result).with_context(|| format!("cannot read {}", result.display()))?)
