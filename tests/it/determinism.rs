@@ -76,6 +76,7 @@ fn plan_folder(world: &World, settings: &SolveSettings, threads: usize) -> TempD
         abstraction: world.abstraction.clone(),
         noise: settings.noise.clone(),
         learning: settings.learn.mode,
+        cost_update: settings.search.cost_update,
         seed: settings.seed,
         solution,
     };
@@ -133,7 +134,7 @@ fn decisions(world: &World, guide: &GuidePath, policy: &OptionPolicy) -> Vec<[u6
         let on_guide = guide.pose_at(guide.length_m() * f64::from(index) / 50.0);
         let pose = Pose::at(on_guide.to_world(Vector::new(0.0, offset)), on_guide.heading);
         let tracker = Tracker::start(guide, &pose);
-        let percept = Percept::first(RobotState::at_rest(pose));
+        let percept = Percept::first(RobotState::at_rest(pose), &NoiseModel::nominal());
         let wanted = policy.decide(&world.workspace, &percept, &tracker, &view, &mut scratch);
         [wanted.reach_m, wanted.bearing_rad, wanted.speed_mps].map(f64::to_bits)
     };

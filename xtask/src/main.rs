@@ -11,6 +11,7 @@ mod ci;
 mod eval;
 mod peers;
 mod peers_learning;
+mod peers_option;
 mod peers_regions;
 mod process;
 mod stats;
@@ -35,9 +36,10 @@ usage: cargo xtask COMMAND
                          sharp eval of that suite
   baselines [ARGS]       sharp eval of every baseline on every problem under every noise
   bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
-  bench peers [sim|learning|regions]
+  bench peers [sim|learning|option|regions]
                          the same work here and in other programs, as JSON lines
-                         [--rounds N] [--seconds S] [--map M]";
+                         [--rounds N] [--seconds S] [--map M] [--option-limit S]
+                         [--option-seeds N] [--peer-threads N] [--problem P]";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::process::{cargo, flag};
 use crate::tree::root;
-use crate::{peers_learning, peers_regions};
+use crate::{peers_learning, peers_option, peers_regions};
 
 const MAPS: [&str; 4] = ["grid_15", "grid_75", "boxes_100", "boxes_10000"];
 /// Our simulators, the beginning of their lines and the layouts of the peer they stand against.
@@ -42,8 +42,11 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     if suite == "learning" {
         return peers_learning::run(&args[1..]);
     }
+    if suite == "option" {
+        return peers_option::run(&args[1..]);
+    }
     let is_known = suite == "sim" || suite.starts_with('-');
-    ensure!(is_known, "no comparison is called {suite:?}, there are sim, learning, regions");
+    ensure!(is_known, "no comparison is called {suite:?}, there are sim, learning, option, regions");
     let rounds: usize = flag(args, "--rounds").unwrap_or("3").parse().context("--rounds")?;
     ensure!(rounds > 0, "--rounds is 0, must be at least 1");
     let seconds: f64 = flag(args, "--seconds").unwrap_or("3").parse().context("--seconds")?;
@@ -239,7 +242,10 @@ mod tests {
     #[test]
     fn unknown_suites_and_maps_are_refused_before_anything_is_built() {
         for (args, expected) in [
-            (vec!["cooking"], "no comparison is called \"cooking\", there are sim, learning, regions"),
+            (
+                vec!["cooking"],
+                "no comparison is called \"cooking\", there are sim, learning, option, regions",
+            ),
             (vec!["sim", "--map", "moon"], "no map is called \"moon\", there are grid_15, grid_75"),
             (vec!["--rounds", "0"], "--rounds is 0, must be at least 1"),
         ] {

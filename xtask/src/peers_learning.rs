@@ -2,7 +2,8 @@
 //!
 //! `sac.updates.*` are gradient steps per second on a filled buffer, by learners of ours and threads
 //! of the peer. `toy.curve` holds mean returns of five seeds on the same point mass with the same
-//! settings, and `toy.steps` how fast both learned it, evaluations included.
+//! settings, and `toy.steps` how fast both learned it, evaluations included. The lines of `bench peers
+//! option` follow.
 
 use std::fs;
 use std::io::Write;
@@ -13,6 +14,7 @@ use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use crate::peers::{load, median, parse, python, succeed};
+use crate::peers_option;
 use crate::process::{cargo, flag};
 use crate::tree::root;
 
@@ -25,7 +27,8 @@ const SEEDS: usize = 5;
 /// The 97.5 % quantile of Student's distribution for the mean of [`SEEDS`] values.
 const STUDENT: f64 = 2.776;
 
-/// Times updates in `--rounds N` rounds of `--seconds S` a number, then compares learning curves.
+/// Times updates in `--rounds N` rounds of `--seconds S` a number, then compares learning curves, and
+/// last what [`peers_option`] compares.
 ///
 /// # Errors
 /// Returns an error if a flag is unreadable, or if a side cannot be built or run.
@@ -42,10 +45,10 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     for line in lines {
         if writeln!(std::io::stdout(), "{line}").is_err() {
             // Whoever reads has read enough.
-            break;
+            return Ok(0);
         }
     }
-    Ok(0)
+    peers_option::run(args)
 }
 
 /// Both sides, ready to run.
@@ -157,7 +160,7 @@ fn peer(python: &Path, args: &[String]) -> anyhow::Result<Value> {
 }
 
 /// PyTorch is large: it has a virtual environment of its own.
-fn folder() -> PathBuf {
+pub(crate) fn folder() -> PathBuf {
     root().join("target/peers-learning")
 }
 

@@ -96,8 +96,22 @@ pub(crate) enum Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Learning {
+    /// Followers and the shipped prior by their certificates; training where none holds.
     Fast,
+    /// The paper's protocol.
     Paper,
+    /// The shipped prior as it is, certified: what learning on the map is worth.
+    Prior,
+}
+
+impl Learning {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Paper => "paper",
+            Self::Prior => "prior",
+        }
+    }
 }
 
 /// What an abstraction is made of.
@@ -142,9 +156,12 @@ pub(crate) struct Solve {
     /// How policies are learnt.
     #[arg(long, value_enum, default_value_t = Learning::Fast)]
     pub(crate) learning: Learning,
-    /// none, nominal, harsh, biased or a noise file (.ron).
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
+    /// Whether measured costs of options flow back into the search, or A* keeps its first ones.
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    pub(crate) cost_update: Switch,
     /// How guides are planned: along the ridge of clearance, or by the paper's learn-and-link trees.
     #[arg(long, value_enum, default_value_t = Guide::Ridge)]
     pub(crate) guide: Guide,
@@ -157,6 +174,9 @@ pub(crate) struct Solve {
     /// Stop after so many seconds of wall time; what was learnt is kept.
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
+    /// Write learning curves for TensorBoard there, one run a leg that is trained [default: none].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) tensorboard: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -172,7 +192,7 @@ pub(crate) struct Run {
     /// Number of executions.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) episodes: u32,
-    /// none, nominal, harsh, biased or a noise file [default: the plan's].
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file [default: the plan's].
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) noise: Option<String>,
     /// The simulator: walls to push and graze, walls that stop, or wheels and gravity in three
@@ -192,6 +212,15 @@ pub(crate) struct Run {
 pub(crate) enum Switch {
     On,
     Off,
+}
+
+impl Switch {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::On => "on",
+            Self::Off => "off",
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -316,6 +345,9 @@ pub(crate) struct PriorTrain {
     /// Begin with the networks of this prior instead of fresh ones.
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,
+    /// Write learning curves for TensorBoard there, as one run [default: none].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) tensorboard: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -323,7 +355,7 @@ pub(crate) struct PriorScore {
     /// husky, limo or a robot file (.ron).
     #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
     pub(crate) robot: String,
-    /// none, nominal, harsh, biased or a noise file (.ron).
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
     /// Number of generated maps.
@@ -411,7 +443,7 @@ pub(crate) struct Baseline {
     /// Number of executions.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) episodes: u32,
-    /// none, nominal, harsh, biased or a noise file (.ron).
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
     /// The simulator: walls to push and graze, walls that stop, or wheels and gravity in three
@@ -430,4 +462,7 @@ pub(crate) struct Baseline {
     /// Environment steps that sac may learn from; unlike a time limit they give equal bytes.
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub(crate) max_env_steps: u64,
+    /// Write learning curves for TensorBoard there, of sac [default: none].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) tensorboard: Option<PathBuf>,
 }

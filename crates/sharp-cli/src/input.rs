@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 
 use sharp_maps::{LoadOptions, MapFile, load};
 use sharp_plan::{Query, Workspace};
-use sharp_sim::{NoiseModel, RobotModel, SimulatorKind, UnknownSimulator};
+use sharp_sim::{NoiseError, NoiseModel, RobotModel, SimulatorKind, UnknownSimulator};
 use sharp_space::{CollisionChecker, Pose};
 
 use crate::args::{MapArgs, Unknown};
@@ -43,10 +43,13 @@ pub(crate) fn robot(name: &str) -> Result<RobotModel, Failure> {
 
 /// The noise called `name`, or described by the file of that name.
 pub(crate) fn noise(name: &str) -> Result<NoiseModel, Failure> {
-    if let Some(noise) = NoiseModel::by_name(name) {
-        return Ok(noise);
+    match NoiseModel::by_name(name) {
+        Ok(noise) => return Ok(noise),
+        Err(NoiseError::Name(_)) => {}
+        Err(error) => return Err(Failure::new("NOISE_INVALID", error.to_string())),
     }
-    let text = read_text(name, "noise", "none, nominal, harsh, biased or a noise file")?;
+    let text =
+        read_text(name, "noise", "none, nominal, harsh, biased, one of them as nominal*2, or a noise file")?;
     NoiseModel::from_ron(&text).map_err(|error| Failure::new("NOISE_INVALID", format!("{name}: {error}")))
 }
 

@@ -1,12 +1,16 @@
 //! Progress on a terminal, interruption, and time by phase.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use sharp_plan::{Learnt, Leg, Monitor, Phase};
+use sharp_rl::Progress;
+
+use crate::curves::CurveFolder;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -83,13 +87,25 @@ pub(crate) struct SolveMonitor {
     spinner: ProgressBar,
     learnt: AtomicUsize,
     deadline: Option<Instant>,
+    curves: Option<Mutex<CurveFolder>>,
 }
 
 impl SolveMonitor {
-    /// Shows on `spinner` what the solver does.
-    pub(crate) fn new(stopwatch: Stopwatch, time_limit: Option<Duration>, spinner: ProgressBar) -> Self {
+    /// Shows on `spinner` what the solver does; `curves` is the folder of learning curves, if they are wanted.
+    pub(crate) fn new(
+        stopwatch: Stopwatch,
+        time_limit: Option<Duration>,
+        spinner: ProgressBar,
+        curves: Option<&Path>,
+    ) -> Self {
         let deadline = time_limit.and_then(|limit| stopwatch.begun.checked_add(limit));
-        Self { stopwatch: Mutex::new(stopwatch), spinner, learnt: AtomicUsize::new(0), deadline }
+        Self {
+            stopwatch: Mutex::new(stopwatch),
+            spinner,
+            learnt: AtomicUsize::new(0),
+            deadline,
+            curves: curves.map(|folder| Mutex::new(CurveFolder::new(folder))),
+        }
     }
 
     fn watch(&self) -> MutexGuard<'_, Stopwatch> {
@@ -118,6 +134,13 @@ impl Monitor for SolveMonitor {
         };
         self.watch().enter(name);
         self.spinner.set_message(message);
+    }
+
+    fn trained(&self, leg: &Leg, progress: &Progress<'_>) {
+        if let Some(curves) = &self.curves {
+            let name = leg.id.to_string().replace(':', "_");
+            curves.lock().unwrap_or_else(PoisonError::into_inner).note(&name, progress);
+        }
     }
 
     fn learnt(&self, leg: &Leg, learnt: &Learnt) {

@@ -146,6 +146,7 @@ pub(crate) struct SolveReport {
     pub(crate) robot: String,
     pub(crate) options: &'static str,
     pub(crate) learning: &'static str,
+    pub(crate) cost_update: &'static str,
     pub(crate) noise: String,
     pub(crate) seed: u64,
     pub(crate) map: MapReport,

@@ -66,7 +66,7 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
         fs::write(folder.path().join(file), text).unwrap();
     }
     fs::write(folder.path().join("bytes.ron"), b"\xff\xfe").unwrap();
-    let cases: [(&[&str], &str, &str); 19] = [
+    let cases: [(&[&str], &str, &str); 20] = [
         (&["solve", "rooms.yaml", "--start", "2,3,0", "--goal", "6.05,1,0"], "GOAL_OCCUPIED", "goal"),
         (&["solve", "rooms.yaml", "--start", "-2,3,0", "--goal", "10,3,0"], "START_OUTSIDE_MAP", "start"),
         (&["solve", "rooms.yaml", "--start", "2,NaN,0", "--goal", "10,3,0"], "POSE_INVALID", "--start"),
@@ -95,6 +95,11 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
             &["solve", "a", "--problem", "1", "--noise", "loud.ron"],
             "NOISE_INVALID",
             "loud.ron: noise: gain_sd is -1",
+        ),
+        (
+            &["solve", "a", "--problem", "1", "--noise", "harsh*-1"],
+            "NOISE_INVALID",
+            "noise \"harsh*-1\": the factor is \"-1\", must be a number from 0 to 10",
         ),
         (&["map", "info", "ajar.ron"], "MAP_FIELD", "ajar.ron: walls[0].doors[0] is 3 m wide"),
         (&["map", "info", "empty.ron"], "MAP_SYNTAX", "empty.ron"),
@@ -188,6 +193,43 @@ fn a_library_is_reused_and_a_damaged_one_is_named() {
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let message = json(&output)["error"]["message"].to_string();
     assert!(message.contains(option.file_name().unwrap().to_str().unwrap()), "{message}");
+}
+
+#[test]
+fn what_was_switched_off_is_named_in_report_and_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let switches = ["--learning", "prior", "--cost-update", "off", "--noise", "nominal*0.5"];
+    let output =
+        solve_rooms(folder.path(), &[&switches[..], &["--library", "none", "--out", "plan"]].concat());
+    let report = json(&output);
+    assert_eq!(report["status"], "solved", "{report}");
+    for (key, value) in [("learning", "prior"), ("cost_update", "off"), ("noise", "nominal*0.5")] {
+        assert_eq!(report[key], value, "{key}");
+    }
+    for leg in report["plan"].as_array().expect("legs") {
+        assert_eq!((&leg["policy"], &leg["gradient_steps"]), (&"learnt".into(), &0.into()), "{leg}");
+    }
+    let plan = fs::read_to_string(folder.path().join("plan/plan.ron")).unwrap();
+    for line in ["learning: prior", "cost_update: false", "gain_sd: 0.1"] {
+        assert!(plan.contains(line), "no {line} in {plan}");
+    }
+}
+
+#[test]
+fn learning_curves_are_written_where_they_are_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let learn = |extra: &[&str]| {
+        let args = ["--json", "baseline", "sac", "rooms.yaml", "--episodes", "1", "--max-env-steps", "150"];
+        json(&sharp(folder.path(), &[&args[..], &ACROSS[..4], extra].concat()))
+    };
+    let report = learn(&["--tensorboard", "curves"]);
+    assert_eq!(report["env_steps"], 150, "{report}");
+    assert_eq!(fs::read_dir(folder.path().join("curves/sac")).unwrap().count(), 1, "one event file");
+    let again = learn(&[]);
+    assert_eq!(again["successes"], report["successes"], "watching changes nothing");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3, "map, image and curves: {again}");
 }
 
 #[test]

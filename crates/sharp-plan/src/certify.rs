@@ -24,6 +24,15 @@ pub struct Certificate {
 const FAILURE_S: f64 = 600.0;
 
 impl Certificate {
+    /// What `ends` showed: for each episode whether it succeeded, and its time in seconds.
+    pub(crate) fn of(ends: impl Iterator<Item = (bool, f64)> + Clone) -> Self {
+        let tally = Tally::count(ends.clone().map(|(succeeded, _)| succeeded));
+        let total_s: f64 = ends.filter(|end| end.0).map(|end| end.1).sum();
+        let successes = f64::from(tally.successes);
+        let mean_time_s = if tally.successes == 0 { f64::INFINITY } else { total_s / successes };
+        Self { tally, mean_time_s }
+    }
+
     /// Seconds per success, and a price for each failure.
     #[must_use]
     pub fn cost_s(&self) -> f64 {
@@ -62,7 +71,7 @@ impl Trial<'_> {
                 let run = drive_chain(self.workspace, vehicle, state, drivers, scratch);
                 (run.passed(drivers.len() - 1), run.times_s.iter().sum())
             });
-        certificate(&ends)
+        Certificate::of(ends.into_iter())
     }
 
     /// Runs `driver` once from each of `states` and returns the states in which it arrived.
@@ -74,7 +83,7 @@ impl Trial<'_> {
             trial.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
                 let state = states[episode as usize];
                 vehicle.reset(state, self.seed.child("exit", 0), episode);
-                driver.drive(self.workspace, vehicle, Percept::first(state), horizon, scratch)
+                driver.drive(self.workspace, vehicle, Percept::first(state, self.noise), horizon, scratch)
             });
         ends.iter().filter(|end| end.outcome == LegOutcome::Done).map(|end| end.percept.state).collect()
     }
@@ -103,11 +112,4 @@ impl Trial<'_> {
             )
             .collect()
     }
-}
-
-fn certificate(ends: &[(bool, f64)]) -> Certificate {
-    let tally = Tally::count(ends.iter().map(|end| end.0));
-    let total_s: f64 = ends.iter().filter(|end| end.0).map(|end| end.1).sum();
-    let mean_time_s = if tally.successes == 0 { f64::INFINITY } else { total_s / f64::from(tally.successes) };
-    Certificate { tally, mean_time_s }
 }

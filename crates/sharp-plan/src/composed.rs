@@ -76,12 +76,13 @@ impl ComposedPolicy {
         };
         let legs: Vec<_> = plan.solution.legs.iter().map(of).collect();
         let tracker = Tracker::start(&legs[0].0.guide, &state.pose);
+        let percept = Percept::first(state, &plan.noise);
         Self {
             plan,
             recovery,
             legs,
             current: 0,
-            percept: Percept::first(state),
+            percept,
             tracker,
             actions: 0,
             stray_actions: 0,
@@ -129,7 +130,7 @@ impl ComposedPolicy {
     /// Tells the policy where its last waypoint brought the robot.
     pub fn observe(&mut self, after: RobotState) {
         let (leg, _) = &self.legs[self.current];
-        self.percept = self.percept.next(self.percept.last_command, after);
+        self.percept = self.percept.next(&self.plan.workspace, self.percept.last_command, after);
         self.tracker.update(&leg.guide, &after.pose);
         self.actions += 1;
         if leg.is_allowed(&after.pose) {

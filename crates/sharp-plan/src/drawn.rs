@@ -125,6 +125,13 @@ pub(crate) fn plan(kind: OptionKind) -> Arc<Plan> {
         predicted: Tally { episodes: 100, successes: 100 },
         predicted_time_s: 20.0,
     };
-    let noise = NoiseModel::none();
-    Arc::new(Plan { workspace, abstraction, noise, learning: LearningMode::Fast, seed: Seed(1), solution })
+    Arc::new(Plan {
+        workspace,
+        abstraction,
+        noise: NoiseModel::none(),
+        learning: LearningMode::Fast,
+        cost_update: true,
+        seed: Seed(1),
+        solution,
+    })
 }

@@ -13,18 +13,18 @@ use sharp_space::{Pose, Seed};
 
 use crate::certify::{Certificate, Trial};
 use crate::leg::Leg;
+use crate::pace::PacedFollower;
 use crate::percept::{Expectation, Tracker, Workspace};
-use crate::policy::{Follower, Form, OptionPolicy, PacedFollower};
+use crate::policy::{Follower, Form, OptionPolicy};
 use crate::prior::{self, Prior};
 use crate::rollout::Driver;
 use crate::starts::Starts;
 use crate::stats::Tally;
 use crate::task::LegTask;
 
-/// Candidates that are left after a first look.
-const CONTENDERS: usize = 8;
-/// Candidates that are certified.
-const FINALISTS: usize = 3;
+/// Rounds in which candidates are compared: the share of [`LearnSettings::screening_episodes`] that each
+/// drives, and how many go on. Those that the last round leaves are certified.
+const ROUNDS: [(f64, usize); 3] = [(0.1, 10), (0.3, 5), (1.0, 3)];
 /// Reward of a contact while a prior is trained on: what it was trained with at full caution.
 const FINE_CONTACT: f64 = -20.0;
 
@@ -34,6 +34,8 @@ const FINE_CONTACT: f64 = -20.0;
 pub enum LearningMode {
     /// In the guide's frame: certified followers first, a learnt correction where none holds.
     Fast,
+    /// The prior at its middle caution, as it is: nothing to choose from and no training, to compare with.
+    Prior,
     /// The paper's protocol.
     Paper,
 }
@@ -62,10 +64,10 @@ impl LearnSettings {
     #[must_use]
     pub fn new(mode: LearningMode) -> Self {
         match mode {
-            LearningMode::Fast => Self {
+            LearningMode::Fast | LearningMode::Prior => Self {
                 mode,
                 wanted_success: 0.99,
-                train_below: 0.98,
+                train_below: if mode == LearningMode::Prior { 0.0 } else { 0.98 },
                 screening_episodes: 200,
                 certify_episodes: 1000,
                 environments: 16,
@@ -131,6 +133,20 @@ pub enum LearnFailure {
     Stopped,
     /// Something was wrong with the task: a NaN, an impossible observation.
     Broken(TrainError),
+}
+
+/// Watches a lesson and may stop it; a closure that says whether to stop watches nothing else.
+pub trait LessonMonitor: Sync {
+    /// Asked now and then; true gives the lesson up.
+    fn should_stop(&self) -> bool;
+    /// A training took a step.
+    fn trained(&self, _progress: &Progress<'_>) {}
+}
+
+impl<F: Fn() -> bool + Sync> LessonMonitor for F {
+    fn should_stop(&self) -> bool {
+        self()
+    }
 }
 
 /// Which pseudo-reward teaches.
@@ -213,24 +229,25 @@ pub struct Lesson<'a> {
 }
 
 impl Lesson<'_> {
-    /// Learns a policy; `stop` is asked now and then whether to give up.
+    /// Learns a policy; `monitor` may give it up.
     ///
     /// # Errors
     /// Says whether it was stopped or what broke. A policy that merely falls short is returned with
     /// its certificate: the planner decides what it is worth.
-    pub fn learn(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
-        self.learn_judged(stop).map(|(_, learnt)| learnt)
+    pub fn learn(&self, monitor: &dyn LessonMonitor) -> Result<Learnt, LearnFailure> {
+        self.learn_judged(monitor).map(|(_, learnt)| learnt)
     }
 
     /// The same, with what [`judge`](Self::judge) says of it.
     pub(crate) fn learn_judged(
         &self,
-        stop: &(dyn Fn() -> bool + Sync),
+        monitor: &dyn LessonMonitor,
     ) -> Result<(Certificate, Learnt), LearnFailure> {
         match self.settings.mode {
-            LearningMode::Fast => self.learn_fast(stop),
+            LearningMode::Fast => self.learn_fast(monitor),
+            LearningMode::Prior => Ok(self.take_prior()),
             LearningMode::Paper => {
-                let learnt = self.learn_paper(stop)?;
+                let learnt = self.learn_paper(monitor)?;
                 let judged = Certificate { tally: learnt.verified, mean_time_s: learnt.mean_time_s };
                 Ok((judged, learnt))
             }
@@ -274,10 +291,10 @@ impl Lesson<'_> {
 
     /// The cheapest policy at hand that holds as wanted; where none does, the one that holds most
     /// often, or what the prior learns on this leg.
-    fn learn_fast(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<(Certificate, Learnt), LearnFailure> {
+    fn learn_fast(&self, monitor: &dyn LessonMonitor) -> Result<(Certificate, Learnt), LearnFailure> {
         let mut best: Option<(Certificate, OptionPolicy)> = None;
         for policy in self.screen() {
-            if stop() {
+            if monitor.should_stop() {
                 return Err(LearnFailure::Stopped);
             }
             let judged = self.judge(&policy);
@@ -292,13 +309,21 @@ impl Lesson<'_> {
         if judged.tally.rate() >= self.settings.train_below {
             return Ok((judged, self.learnt(policy, judged, (0, 0))));
         }
-        let trained = self.train_on(stop)?;
+        let trained = self.train_on(monitor)?;
         let alone = Certificate { tally: trained.verified, mean_time_s: trained.mean_time_s };
         let anew = if self.tail.is_empty() { alone } else { self.judge(&trained.policy) };
         if anew.tally.successes > judged.tally.successes {
             return Ok((anew, trained));
         }
         Ok((judged, self.learnt(policy, judged, (trained.env_steps, trained.gradient_steps))))
+    }
+
+    /// The prior as it was trained on other maps.
+    fn take_prior(&self) -> (Certificate, Learnt) {
+        let robot = &self.workspace.robot;
+        let policy = Prior::shipped(robot).policy(robot, self.noise);
+        let judged = self.judge(&policy);
+        (judged, self.learnt(policy, judged, (0, 0)))
     }
 
     /// What drives without learning: the few that cost least, each round on more episodes than the one
@@ -309,10 +334,8 @@ impl Lesson<'_> {
             Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
         left.extend(PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced));
         left.extend(Prior::shipped(robot).candidates(robot, self.noise));
-        let screening = self.settings.screening_episodes;
-        for (round, (episodes, keep)) in
-            [(screening.div_ceil(4), CONTENDERS), (screening, FINALISTS)].into_iter().enumerate()
-        {
+        for (round, (share, keep)) in ROUNDS.into_iter().enumerate() {
+            let episodes = (share * f64::from(self.settings.screening_episodes)).ceil() as u32;
             let trial = self.trial(episodes, "screen", round as u64);
             let cost_s = |policy: &OptionPolicy| trial.of_legs(&self.drivers(policy), &self.starts).cost_s();
             let mut costs: Vec<(f64, OptionPolicy)> =
@@ -324,17 +347,17 @@ impl Lesson<'_> {
     }
 
     /// The prior, trained further on this leg alone.
-    fn train_on(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+    fn train_on(&self, monitor: &dyn LessonMonitor) -> Result<Learnt, LearnFailure> {
         let robot = &self.workspace.robot;
         let form = prior::form(robot, Expectation::new(self.noise, 1.0));
         let reward = ShapedReward { contact: FINE_CONTACT, ..ShapedReward::default() };
         let networks = Prior::shipped(robot).networks();
-        self.learn_sac(form, RewardMode::Shaped(reward), Some(networks), stop)
+        self.learn_sac(form, RewardMode::Shaped(reward), Some(networks), monitor)
     }
 
-    fn learn_paper(&self, stop: &(dyn Fn() -> bool + Sync)) -> Result<Learnt, LearnFailure> {
+    fn learn_paper(&self, monitor: &dyn LessonMonitor) -> Result<Learnt, LearnFailure> {
         let form = Form::Absolute { reach_m: self.workspace.robot.waypoint_reach_m };
-        self.learn_sac(form, RewardMode::Paper(PseudoReward::default()), None, stop)
+        self.learn_sac(form, RewardMode::Paper(PseudoReward::default()), None, monitor)
     }
 
     fn learn_sac(
@@ -342,7 +365,7 @@ impl Lesson<'_> {
         form: Form,
         reward: RewardMode,
         networks: Option<&SacState>,
-        stop: &(dyn Fn() -> bool + Sync),
+        monitor: &dyn LessonMonitor,
     ) -> Result<Learnt, LearnFailure> {
         let task = |index| {
             let starts = Arc::clone(&self.starts);
@@ -351,8 +374,9 @@ impl Lesson<'_> {
             LegTask::new(self.workspace, legs, form, reward, starts, noise)
         };
         let mut tasks: Vec<LegTask> = (0..self.settings.environments).map(task).collect();
-        let mut observer = |_: &Progress<'_>| {
-            if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let mut observer = |progress: &Progress<'_>| {
+            monitor.trained(progress);
+            if monitor.should_stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let mut rng = self.seed.stream("sac", 0);
         let settings = &self.settings.train;
@@ -361,7 +385,7 @@ impl Lesson<'_> {
             None => train(&mut tasks, settings, &mut rng, &mut observer),
         };
         let trained = trained.map_err(LearnFailure::Broken)?;
-        if stop() {
+        if monitor.should_stop() {
             return Err(LearnFailure::Stopped);
         }
         let policy = OptionPolicy::Learnt { form, actor: Box::new(trained.actor) };

@@ -6,6 +6,7 @@
 //! [`run`] drives it in a simulator, and a [`ComposedPolicy`] drives anything else.
 
 mod baseline;
+mod belief;
 mod certify;
 mod composed;
 mod execute;
@@ -13,6 +14,8 @@ mod files;
 mod learn;
 mod leg;
 mod library;
+mod model;
+mod pace;
 mod percept;
 mod plan;
 mod planner;
@@ -30,21 +33,20 @@ mod drawn;
 
 pub use baseline::{
     Baseline, ComparisonSettings, Driven, Host, Mppi, MppiSettings, Pilot, Readiness, RoutePlanner, Rrt, Sac,
-    SacBudget, Situation, SpeedRule, Track, TrackSettings, compare,
+    SacBudget, Situation, Track, compare,
 };
 pub use certify::{Certificate, Trial};
 pub use composed::{ComposedPolicy, Decision, Events};
 pub use execute::{Episode, EpisodeEnd, RunSettings, run, success};
 pub use files::{FileError, hash, read_ron, write_atomic, write_ron};
-pub use learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson, RewardMode};
+pub use learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson, LessonMonitor, RewardMode};
 pub use leg::{Leg, LegId, Role, Target};
 pub use library::{FORMAT, OptionLibrary, StoredOption};
+pub use pace::{PacedFollower, SpeedRule};
 pub use percept::{Expectation, Percept, Tracker, Workspace};
 pub use plan::{AbstractionFile, Plan, map_hash};
 pub use planner::{Abstraction, Planner, Query, SearchSettings, Unplaced};
-pub use policy::{
-    Correction, DecisionScratch, Follower, Form, GuideView, OptionPolicy, PacedFollower, PolarWaypoint, Rule,
-};
+pub use policy::{Correction, DecisionScratch, Follower, Form, GuideView, OptionPolicy, PolarWaypoint, Rule};
 pub use prior::Prior;
 pub use rollout::{ChainRun, Driver, LegEnd, LegOutcome, drive_chain};
 pub use search::{Candidate, OptionGraph};

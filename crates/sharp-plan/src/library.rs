@@ -16,11 +16,12 @@ use sharp_rl::Actor;
 
 use crate::files::{self, FileError};
 use crate::learn::Learnt;
-use crate::policy::{Follower, Form, OptionPolicy, PacedFollower};
+use crate::pace::PacedFollower;
+use crate::policy::{Follower, Form, OptionPolicy};
 use crate::stats::Tally;
 
 /// Raised whenever the files change their meaning.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 
 /// A policy as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -7,6 +7,8 @@ use sharp_guide::GuidePath;
 use sharp_sim::{ActionSettings, Drive, NoiseModel, RobotModel, RobotState, World};
 use sharp_space::{FootprintChecker, Heading, OccupancyGrid, Pose, Vector};
 
+use crate::belief::Belief;
+use crate::model::Model;
 use crate::policy::{GuideView, PolarWaypoint};
 
 /// Rays around the robot that feel for walls.
@@ -39,6 +41,8 @@ pub struct Workspace {
     pub checker: Arc<FootprintChecker>,
     /// The map as the simulators see it.
     pub world: Arc<World>,
+    /// What its actions do, as policies imagine it.
+    pub(crate) model: Arc<Model>,
 }
 
 impl Workspace {
@@ -47,7 +51,8 @@ impl Workspace {
     pub fn new(grid: OccupancyGrid, robot: RobotModel) -> Self {
         let checker = Arc::new(FootprintChecker::new(&grid, robot.footprint));
         let world = Arc::new(World::new(&grid, robot.footprint));
-        Self { grid: Arc::new(grid), robot: Arc::new(robot), checker, world }
+        let model = Arc::new(Model::new(&robot));
+        Self { grid: Arc::new(grid), robot: Arc::new(robot), checker, world, model }
     }
 }
 
@@ -63,6 +68,8 @@ pub struct Percept {
     /// What noise did of late: turn beyond the bearing asked for, radians an action, and distance
     /// driven as a share of what was asked for; means in which older actions count less.
     pub felt: [f64; 2],
+    /// What all actions of the episode say of the robot's slip and pull.
+    pub belief: Belief,
 }
 
 /// What a learnt policy is told before it drives: how careful to be and which noise to expect.
@@ -109,21 +116,29 @@ impl Expectation {
 impl Percept {
     /// The percept of a robot that has not acted yet.
     #[must_use]
-    pub const fn first(state: RobotState) -> Self {
+    pub fn first(state: RobotState, noise: &NoiseModel) -> Self {
         let last_command = PolarWaypoint { reach_m: 0.0, bearing_rad: 0.0, speed_mps: 0.0 };
-        Self { state, last_displacement: [0.0; 3], last_command, felt: [0.0, 1.0] }
+        let belief = Belief::new(noise);
+        Self { state, last_displacement: [0.0; 3], last_command, felt: [0.0, 1.0], belief }
     }
 
-    /// The percept after `command` moved the robot to `after`.
+    /// The percept after `command` moved the robot of `workspace` to `after`.
     #[must_use]
-    pub fn next(&self, command: PolarWaypoint, after: RobotState) -> Self {
+    pub fn next(&self, workspace: &Workspace, command: PolarWaypoint, after: RobotState) -> Self {
         let before = &self.state.pose;
         let moved = before.to_local(after.pose.position);
         let turn = before.heading.turn_to(after.pose.heading);
         let asked_m = command.speed_mps.mul_add(ActionSettings::default().action_s, 0.05);
         let now = [turn - command.bearing_rad.clamp(-1.0, 1.0), moved.norm() / asked_m];
         let felt = [0, 1].map(|i| FELT_KEPT * self.felt[i] + (1.0 - FELT_KEPT) * now[i]);
-        Self { state: after, last_displacement: [moved.x, moved.y, turn], last_command: command, felt }
+        let belief = self.belief.after(&workspace.model, (&self.state, command), &after);
+        Self {
+            state: after,
+            last_displacement: [moved.x, moved.y, turn],
+            last_command: command,
+            felt,
+            belief,
+        }
     }
 }
 
@@ -272,7 +287,7 @@ mod tests {
         let (workspace, _) = world(HALL, OptionKind::Centroid);
         let guide = straight((1.0, 2.0), (9.0, 2.0));
         let state = RobotState::rolling(Pose::new(2.0, 2.3, 0.4), 0.5);
-        let percept = Percept::first(state);
+        let percept = Percept::first(state, &NoiseModel::harsh());
         let tracker = Tracker::start(&guide, &state.pose);
         let mut observation = [f32::NAN; GUIDE_OBSERVATION_LEN];
         let view = GuideView { guide: &guide, next: None };
@@ -287,9 +302,11 @@ mod tests {
 
     #[test]
     fn displacements_are_felt_in_the_frame_before_the_action() {
-        let before = Percept::first(RobotState::at_rest(Pose::new(1.0, 1.0, std::f64::consts::FRAC_PI_2)));
+        let (workspace, _) = world(HALL, OptionKind::Centroid);
+        let state = RobotState::at_rest(Pose::new(1.0, 1.0, std::f64::consts::FRAC_PI_2));
+        let before = Percept::first(state, &NoiseModel::harsh());
         let command = PolarWaypoint { reach_m: 0.5, bearing_rad: 0.0, speed_mps: 1.0 };
-        let after = before.next(command, RobotState::at_rest(Pose::new(0.9, 1.4, 2.0)));
+        let after = before.next(&workspace, command, RobotState::at_rest(Pose::new(0.9, 1.4, 2.0)));
         let [ahead, left, turn] = after.last_displacement;
         assert!((ahead - 0.4).abs() < 1e-9 && (left - 0.1).abs() < 1e-9, "{ahead} ahead, {left} left");
         assert!((turn - (2.0 - std::f64::consts::FRAC_PI_2)).abs() < 1e-9, "{turn}");

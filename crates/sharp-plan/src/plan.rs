@@ -98,6 +98,8 @@ pub struct Plan {
     pub noise: NoiseModel,
     /// How its policies were learnt.
     pub learning: LearningMode,
+    /// Whether measured costs flowed back into its search.
+    pub cost_update: bool,
     /// The seed it was made with.
     pub seed: Seed,
     /// The composed policy.
@@ -112,12 +114,19 @@ struct PlanFile {
     robot: RobotModel,
     noise: NoiseModel,
     learning: LearningMode,
+    // Plans from before there was a choice have no such line.
+    #[serde(default = "usual_cost_update")]
+    cost_update: bool,
     seed: Seed,
     start: Pose,
     goal: Pose,
     predicted: Tally,
     predicted_time_s: f64,
     legs: Vec<LegFile>,
+}
+
+const fn usual_cost_update() -> bool {
+    true
 }
 
 #[derive(Serialize, Deserialize)]
@@ -151,6 +160,7 @@ impl Plan {
             robot: (*self.workspace.robot).clone(),
             noise: self.noise.clone(),
             learning: self.learning,
+            cost_update: self.cost_update,
             seed: self.seed,
             start: self.solution.query.start,
             goal: self.solution.query.goal,
@@ -192,6 +202,7 @@ impl Plan {
             abstraction,
             noise: file.noise,
             learning: file.learning,
+            cost_update: file.cost_update,
             seed: file.seed,
             solution: Solution { query, legs, predicted, predicted_time_s },
         })
@@ -257,6 +268,7 @@ mod tests {
             let read = Plan::load(folder.path(), (*plan.workspace.grid).clone()).unwrap();
             assert_eq!(read.solution.query, plan.solution.query, "{kind:?}");
             assert_eq!(*read.workspace.robot, *plan.workspace.robot, "{kind:?}");
+            assert_eq!((read.learning, read.cost_update), (LearningMode::Fast, true), "{kind:?}");
             for (read, written) in read.solution.legs.iter().zip(&plan.solution.legs) {
                 assert_eq!(read.leg.id, written.leg.id, "{kind:?}");
                 assert_eq!(read.leg.guide, written.leg.guide, "{}", written.leg.id);

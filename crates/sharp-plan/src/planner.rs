@@ -23,6 +23,16 @@ use crate::sharp::{Monitor, Phase};
 /// Legs whose ends are further apart than this cross their interfaces at right angles, metres.
 const CROSSING_M: f64 = 1.2;
 
+/// Looks before and behind an interface that tell in which direction it has most room: 0.8 m.
+const CROSSING_LOOKS: i32 = 8;
+/// Turns from the normal that are tried to either side, and the step between them: 60 degrees in all.
+const CROSSING_TURNS: i32 = 12;
+const CROSSING_TURN_RAD: f64 = std::f64::consts::PI / 36.0;
+/// Room beyond the outline's circle that is as good as any, metres.
+const ROOM_ENOUGH_M: f64 = 0.25;
+/// Room that keeping to the normal is worth, metres a radian.
+const NORMAL_M_PER_RAD: f64 = 0.1;
+
 /// A car turns no further than this in its stride, however much room it has: 120 degrees.
 const CAR_TURN_MAX_RAD: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
 
@@ -45,6 +55,8 @@ pub struct SearchSettings {
     /// Seconds added to a first or last leg that passes a centroid by: no later problem can reuse it,
     /// and the paper knows no such leg.
     pub shortcut_surcharge_s: f64,
+    /// Learnt legs cost what was measured of them (line 18 of Algorithm 1); false keeps the first costs.
+    pub cost_update: bool,
     /// Largest turn between two guides that a robot which turns in place takes in its stride, radians.
     pub smooth_turn_rad: f64,
     /// How guides are planned.
@@ -59,6 +71,7 @@ impl SearchSettings {
             nominal_speed_mps: 0.5 * workspace.robot.max_speed_mps,
             untrained_surcharge_s: 2.0,
             shortcut_surcharge_s: 6.0,
+            cost_update: true,
             // The footprint swings out in a turn: beyond 75 degrees it needs room or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),
             guide: GuideSettings::default(),
@@ -174,6 +187,7 @@ impl<'a> Planner<'a> {
         let least_s = straight_m / self.workspace.robot.max_speed_mps;
         let estimated = length_m / self.settings.nominal_speed_mps + self.settings.untrained_surcharge_s;
         let shortcut_s = if leg.is_shortcut { self.settings.shortcut_surcharge_s } else { 0.0 };
+        let measured = measured.filter(|_| self.settings.cost_update);
         measured.map_or(estimated, |seconds| seconds.max(least_s)) + shortcut_s
     }
 
@@ -227,8 +241,9 @@ impl<'a> Planner<'a> {
         };
         // On a short leg two crossing directions would leave no room for the way between them.
         let crosses = (candidate.end - candidate.start).norm() > CROSSING_M;
-        let crossing =
-            |endpoint: Option<&Endpoint>, to| endpoint.filter(|_| crosses).and_then(|end| approach(end, to));
+        let crossing = |endpoint: Option<&Endpoint>, to| {
+            endpoint.filter(|_| crosses).and_then(|end| approach(self.workspace, end, to))
+        };
         let start_heading = match id {
             LegId::First(_) | LegId::Direct => Some(self.query.start.heading),
             LegId::Option(option) => crossing(source, option.through().unwrap_or(option.to())),
@@ -253,11 +268,22 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// The direction in which an interface is crossed towards `to`.
-fn approach(endpoint: &Endpoint, to: StateId) -> Option<Heading> {
-    let normal = endpoint.normal?;
-    let forward = endpoint.states.last() == Some(&to);
-    Some(if forward { normal } else { Heading::new(normal.radians() + std::f64::consts::PI) })
+/// The direction in which an interface is crossed towards `to`: the one with most room before and behind,
+/// the border's normal where room does not tell.
+fn approach(workspace: &Workspace, endpoint: &Endpoint, to: StateId) -> Option<Heading> {
+    let normal_rad = endpoint.normal?.radians();
+    let towards = if endpoint.states.last() == Some(&to) { 0.0 } else { std::f64::consts::PI };
+    let field = workspace.checker.field();
+    let enough_m = workspace.robot.footprint.circumscribed_radius_m() + ROOM_ENOUGH_M;
+    let worth = |turn_rad: f64| {
+        let unit = Heading::new(normal_rad + turn_rad).unit();
+        let along = (-CROSSING_LOOKS..=CROSSING_LOOKS).map(|look| 0.1 * f64::from(look));
+        let room_m = along.map(|ahead_m| field.sample(endpoint.center + unit * ahead_m));
+        room_m.fold(enough_m, f64::min) - NORMAL_M_PER_RAD * turn_rad.abs()
+    };
+    let turns_rad = (0..=2 * CROSSING_TURNS).map(|i| f64::from(i - CROSSING_TURNS) * CROSSING_TURN_RAD);
+    let best_rad = turns_rad.max_by(|&a, &b| worth(a).total_cmp(&worth(b)))?;
+    Some(Heading::new(normal_rad + best_rad + towards))
 }
 
 /// α(x), or the state of the nearest cell that has one within half a metre: a robot may stand where
@@ -316,6 +342,10 @@ mod tests {
         let slow = |id| (id == option).then_some(500.0);
         let second = planner(&world, query).plan(&slow, &()).expect("the other way");
         assert!(second.iter().all(|leg| leg.id != option), "{} uses the slow {option}", names(&second));
+        let settings = SearchSettings { cost_update: false, ..SearchSettings::new(&world.0) };
+        let planner = Planner::new(&world.0, &world.1, settings, query, [], Seed(1));
+        let third = planner.expect("both ends have a state").plan(&slow, &()).expect("the first way");
+        assert_eq!(names(&third), names(&first), "without the update nothing flows back");
     }
 
     #[test]

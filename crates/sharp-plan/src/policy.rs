@@ -10,13 +10,14 @@ use sharp_rl::{Actor, ActorScratch};
 use sharp_sim::RobotModel;
 use sharp_space::{Heading, Point, Pose, Vector};
 
+use crate::pace::PacedFollower;
 use crate::percept::{Expectation, Percept, Tracker, Workspace, absolute_observation, guide_observation};
 
 /// The slowest that a learnt policy drives, as a share of the top speed: enough to turn on the spot.
 const SLOWEST: f64 = 0.05;
 
-/// Distance between two looks along the guide, metres.
-const PACE_STEP_M: f64 = 0.25;
+/// Share of the pull, as it is believed so far, that followers make up for. Learnt policies feel it themselves.
+const TRIM: f64 = 0.5;
 
 /// How a follower chooses its direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,17 +47,6 @@ pub struct Follower {
     pub rule: Rule,
     /// How fast, metres per second.
     pub speed_mps: f64,
-}
-
-/// Follows a guide path fast where it may and slowly where it must: where room is scarce, before
-/// bends and while the robot looks elsewhere.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PacedFollower {
-    /// Where to, and how fast where nothing asks for care.
-    pub follower: Follower,
-    /// How fast where everything does, metres per second.
-    pub slow_mps: f64,
 }
 
 /// A waypoint as the robot sees it.
@@ -132,63 +122,6 @@ impl Follower {
         };
         PolarWaypoint { reach_m: robot.waypoint_reach_m, bearing_rad, speed_mps: self.speed_mps }
     }
-}
-
-impl PacedFollower {
-    /// The paced followers worth trying for `robot`.
-    #[must_use]
-    pub fn candidates(robot: &RobotModel) -> Vec<Self> {
-        let rules = [
-            Rule::Pursuit { look_ahead_m: 0.5 },
-            Rule::Pursuit { look_ahead_m: 0.3 },
-            Rule::Field { look_ahead_m: 0.4, softness_m: 0.4 },
-            Rule::Field { look_ahead_m: 0.15, softness_m: 0.2 },
-        ];
-        let paces = [(1.0, 0.3), (0.8, 0.15), (0.5, 0.1)];
-        let top_mps = robot.max_speed_mps;
-        let paced = |rule, (fast, slow): (f64, f64)| Self {
-            follower: Follower { rule, speed_mps: fast * top_mps },
-            slow_mps: slow * top_mps,
-        };
-        paces.into_iter().flat_map(|pace| rules.map(|rule| paced(rule, pace))).collect()
-    }
-
-    /// The next waypoint, as [`Follower::waypoint`].
-    #[must_use]
-    pub fn waypoint(
-        &self,
-        workspace: &Workspace,
-        pose: &Pose,
-        tracker: &Tracker,
-        view: &GuideView<'_>,
-    ) -> PolarWaypoint {
-        let wanted = self.follower.waypoint(&workspace.robot, pose, tracker, view);
-        let ease = ease(workspace, pose, tracker, view);
-        PolarWaypoint { speed_mps: self.slow_mps + (wanted.speed_mps - self.slow_mps) * ease, ..wanted }
-    }
-}
-
-/// How freely a robot at `pose` may drive along its guide: 1 where room, bends and its own heading
-/// allow every speed, 0 where one of them forbids all haste.
-fn ease(workspace: &Workspace, pose: &Pose, tracker: &Tracker, view: &GuideView<'_>) -> f64 {
-    let turns_in_place = workspace.robot.can_turn_in_place();
-    let (room_m, turn_max_rad, error_max_rad, ahead_m) =
-        if turns_in_place { ([0.15, 0.6], 2.0, 0.5, 1.5) } else { ([0.1, 0.6], 1.6, 1.0, 0.75) };
-    let half_width_m = workspace.robot.footprint.inscribed_radius_m();
-    let field = workspace.checker.field();
-    let (mut least_m, mut turn_rad) = (f64::INFINITY, 0.0);
-    let mut before = tracker.tangent;
-    for step in 0..=(ahead_m / PACE_STEP_M) as usize {
-        let ahead = view.ahead(tracker.arc_m + step as f64 * PACE_STEP_M);
-        least_m = least_m.min(field.sample(ahead.position) - half_width_m);
-        turn_rad += before.turn_to(ahead.heading).abs();
-        before = ahead.heading;
-    }
-    let error_rad = tracker.tangent.turn_to(pose.heading).abs();
-    ((least_m - room_m[0]) / (room_m[1] - room_m[0]))
-        .min(1.0 - turn_rad / turn_max_rad)
-        .min(1.0 - error_rad / error_max_rad)
-        .clamp(0.0, 1.0)
 }
 
 /// A guide path and, where it is known, the one that follows it.
@@ -344,9 +277,13 @@ impl OptionPolicy {
     ) -> PolarWaypoint {
         match self {
             Self::Follower(follower) => {
-                follower.waypoint(&workspace.robot, &percept.state.pose, tracker, view)
+                let wanted = follower.waypoint(&workspace.robot, &percept.state.pose, tracker, view);
+                percept.belief.trim(&workspace.model, wanted, TRIM).applied(wanted)
             }
-            Self::Paced(paced) => paced.waypoint(workspace, &percept.state.pose, tracker, view),
+            Self::Paced(paced) => {
+                let wanted = paced.waypoint(workspace, &percept.state.pose, tracker, view);
+                percept.belief.trim(&workspace.model, wanted, paced.trim).applied(wanted)
+            }
             Self::Learnt { form, actor } => {
                 scratch.observation.resize(form.observation_len(), 0.0);
                 form.observe(workspace, percept, tracker, view, &mut scratch.observation);
@@ -359,8 +296,11 @@ impl OptionPolicy {
 
 #[cfg(test)]
 mod tests {
+    use sharp_options::OptionKind;
+    use sharp_sim::{NoiseModel, RobotState};
+
     use super::*;
-    use crate::drawn::straight;
+    use crate::drawn::{HALL, straight, world};
 
     const EAST: ((f64, f64), (f64, f64)) = ((0.0, 0.0), (2.0, 0.0));
 
@@ -370,6 +310,35 @@ mod tests {
 
     fn at(pose: Pose, guide: &GuidePath) -> (Pose, Tracker) {
         (pose, Tracker::start(guide, &pose))
+    }
+
+    #[test]
+    fn a_robot_that_is_pulled_to_the_left_is_steered_to_the_right() {
+        let guide = straight((1.0, 2.0), (9.0, 2.0));
+        let view = GuideView { guide: &guide, next: None };
+        let (workspace, _) = world(HALL, OptionKind::Centroid);
+        let mut percept = Percept::first(RobotState::at_rest(Pose::new(2.0, 2.0, 0.0)), &NoiseModel::harsh());
+        let tracker = Tracker::start(&guide, &percept.state.pose);
+        let policies = [
+            OptionPolicy::Follower(Follower::cautious(&husky())),
+            OptionPolicy::Paced(PacedFollower::candidates(&husky())[0]),
+        ];
+        let bearings_rad = |percept: &Percept| {
+            let decide = |policy: &OptionPolicy| {
+                policy.decide(&workspace, percept, &tracker, &view, &mut DecisionScratch::default())
+            };
+            policies.each_ref().map(|policy| decide(policy).bearing_rad)
+        };
+        assert!(bearings_rad(&percept).iter().all(|rad| rad.abs() < 1e-9), "nothing is known yet");
+        let command = PolarWaypoint { reach_m: 0.5, bearing_rad: 0.0, speed_mps: 0.5 };
+        for _ in 0..20 {
+            let percept_before = percept;
+            percept = percept.next(&workspace, command, RobotState::rolling(Pose::new(2.2, 2.0, 0.15), 0.5));
+            percept.state = percept_before.state;
+        }
+        for rad in bearings_rad(&percept) {
+            assert!(rad < -0.02, "steered by {rad} against a pull of {:?}", percept.belief);
+        }
     }
 
     #[test]
@@ -433,9 +402,10 @@ mod tests {
         };
         let (pose, tracker) = at(Pose::new(0.5, 0.2, 0.1), &guide);
         let wanted = base.waypoint(&husky(), &pose, &tracker, &view);
-        assert_eq!(form.waypoint(&husky(), &pose, &tracker, &view, &[0.0, 0.0]), wanted, "no correction");
+        let corrected = |action: &[f32]| form.waypoint(&husky(), &pose, &tracker, &view, action);
+        assert_eq!(corrected(&[0.0, 0.0]), wanted, "no correction");
         for (action, speed_mps, turn) in [([1.0, 1.0], 1.0, 0.8), ([-1.0, -1.0], 0.05, -0.8)] {
-            let corrected = form.waypoint(&husky(), &pose, &tracker, &view, &action);
+            let corrected = corrected(&action);
             assert_eq!(corrected.speed_mps, speed_mps, "the robot's limits bound {action:?}");
             assert!((corrected.bearing_rad - wanted.bearing_rad - turn).abs() < 1e-9, "{action:?}");
         }

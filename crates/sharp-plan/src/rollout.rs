@@ -70,7 +70,7 @@ impl Driver<'_> {
             let report = vehicle.act_at(command.to_world(&percept.state.pose), command.speed_mps);
             time_s += report.time_s;
             path_m += report.path_m;
-            percept = percept.next(command, report.after);
+            percept = percept.next(workspace, command, report.after);
             tracker.update(&self.leg.guide, &percept.state.pose);
             stray_actions += u32::from(!self.leg.is_allowed(&percept.state.pose));
             if report.contact {
@@ -111,7 +111,7 @@ pub fn drive_chain<S: Simulator>(
     scratch: &mut DecisionScratch,
 ) -> ChainRun {
     let mut run = ChainRun { entries: vec![], times_s: vec![], outcome: LegOutcome::Done };
-    let mut percept = Percept::first(start);
+    let mut percept = Percept::first(start, vehicle.noise());
     for driver in drivers {
         run.entries.push(percept.state);
         let horizon = driver.leg.horizon_actions(crate::SLOWEST_REACH_M);

@@ -7,12 +7,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use sharp_options::OptionKind;
+use sharp_rl::Progress;
 use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Seed;
 
 use crate::certify::{Certificate, Trial};
 use crate::files::FileError;
-use crate::learn::{LearnSettings, LearningMode, Learnt, Lesson};
+use crate::learn::{LearnSettings, LearningMode, Learnt, Lesson, LessonMonitor};
 use crate::leg::{Leg, LegId, Role};
 use crate::library::OptionLibrary;
 use crate::percept::Workspace;
@@ -64,7 +65,8 @@ impl SolveSettings {
             search,
             noise,
             repair_episodes: 1000,
-            repair_rounds: if mode == LearningMode::Paper { 0 } else { 3 },
+            // Only where there is something to choose from can a leg choose again.
+            repair_rounds: if mode == LearningMode::Fast { 3 } else { 0 },
             wanted_success: 0.99,
             verify_episodes: 1000,
             // The paper keeps whatever was learnt.
@@ -93,6 +95,8 @@ pub enum Phase {
 pub trait Monitor: Sync {
     /// A phase begins.
     fn phase(&self, _phase: Phase) {}
+    /// The training of a leg took a step; several legs may train at once.
+    fn trained(&self, _leg: &Leg, _progress: &Progress<'_>) {}
     /// A leg was learnt.
     fn learnt(&self, _leg: &Leg, _learnt: &Learnt) {}
     /// Asked often; true ends the search as soon as possible. What was learnt is kept.
@@ -102,6 +106,22 @@ pub trait Monitor: Sync {
 }
 
 impl Monitor for () {}
+
+/// A monitor, on one leg.
+struct LegMonitor<'a> {
+    monitor: &'a dyn Monitor,
+    leg: &'a Leg,
+}
+
+impl LessonMonitor for LegMonitor<'_> {
+    fn should_stop(&self) -> bool {
+        self.monitor.should_stop()
+    }
+
+    fn trained(&self, progress: &Progress<'_>) {
+        self.monitor.trained(self.leg, progress);
+    }
+}
 
 /// A leg of a solution.
 #[derive(Clone, Debug)]
@@ -269,15 +289,10 @@ impl Run<'_> {
     /// Repairs the plan of `legs` and counts how often it holds; `None` if stopped.
     fn verify(&mut self, legs: &[Arc<Leg>]) -> Result<Option<Solution>, FileError> {
         self.monitor.phase(Phase::Verify);
-        for round in 0..self.settings.repair_rounds {
-            if self.monitor.should_stop() {
-                return Ok(None);
-            }
-            if !self.repair(legs, u64::from(round))? {
-                break;
-            }
+        if self.settings.repair_rounds > 0 && !self.repair(legs)? {
+            return Ok(None);
         }
-        let runs = self.run_chain(legs, self.settings.verify_episodes, "verify", 0);
+        let runs = self.run_chain(&self.drivers(legs), self.settings.verify_episodes, "verify", 0);
         let on_arrival = tallies(&runs, legs.len());
         Ok(Some(self.solution(legs, &runs, &on_arrival)))
     }
@@ -306,10 +321,10 @@ impl Run<'_> {
         legs.iter().enumerate().map(driver).collect()
     }
 
-    fn run_chain(&self, legs: &[Arc<Leg>], episodes: u32, purpose: &str, index: u64) -> Vec<ChainRun> {
+    fn run_chain(&self, drivers: &[Driver<'_>], episodes: u32, purpose: &str, index: u64) -> Vec<ChainRun> {
         let seed = self.settings.seed.child(purpose, index);
         let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes, seed };
-        trial.of_chain(&self.drivers(legs), RobotState::at_rest(self.query.start))
+        trial.of_chain(drivers, RobotState::at_rest(self.query.start))
     }
 
     fn solution(&self, legs: &[Arc<Leg>], runs: &[ChainRun], on_arrival: &[Tally]) -> Solution {
@@ -319,16 +334,12 @@ impl Run<'_> {
             reused: self.before.contains(&leg.id),
             on_arrival,
         };
-        let succeeded: Vec<f64> = runs
-            .iter()
-            .filter(|run| run.outcome == LegOutcome::Done)
-            .map(|run| run.times_s.iter().sum())
-            .collect();
+        let Certificate { tally, mean_time_s } = certificate(runs);
         Solution {
             query: self.query,
             legs: legs.iter().zip(on_arrival).map(planned).collect(),
-            predicted: Tally::count(runs.iter().map(|run| run.outcome == LegOutcome::Done)),
-            predicted_time_s: succeeded.iter().sum::<f64>() / succeeded.len().max(1) as f64,
+            predicted: tally,
+            predicted_time_s: if mean_time_s.is_finite() { mean_time_s } else { 0.0 },
         }
     }
 
@@ -347,6 +358,11 @@ impl Run<'_> {
 /// The names of `legs`.
 fn ids(legs: &[Arc<Leg>]) -> Vec<LegId> {
     legs.iter().map(|leg| leg.id).collect()
+}
+
+/// How often all legs held, and how long that took.
+fn certificate(runs: &[ChainRun]) -> Certificate {
+    Certificate::of(runs.iter().map(|run| (run.outcome == LegOutcome::Done, run.times_s.iter().sum())))
 }
 
 /// For each leg: how often it was entered, and how often it then held.
@@ -370,6 +386,9 @@ mod tests {
 
     use super::*;
     use crate::drawn::{HALL, SEALED, along, world};
+    use crate::percept::Expectation;
+    use crate::policy::OptionPolicy;
+    use crate::prior;
     use sharp_space::Pose;
 
     fn settings(workspace: &Workspace) -> SolveSettings {
@@ -413,6 +432,24 @@ mod tests {
         let phases = notes.phases.into_inner().expect("no other panic");
         assert_eq!((phases.first(), phases.last()), (Some(&Phase::Search), Some(&Phase::Done)), "{phases:?}");
         assert!(notes.learnt.into_inner().expect("no other panic").len() >= 4, "every leg was told");
+    }
+
+    #[test]
+    fn the_prior_alone_is_certified_and_neither_trained_nor_repaired() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let prior = SolveSettings::new(&workspace, LearningMode::Prior, NoiseModel::nominal(), Seed(1));
+        let learn = LearnSettings { certify_episodes: 100, ..prior.learn };
+        let settings = SolveSettings { learn, verify_episodes: 100, ..prior };
+        let mut library = OptionLibrary::in_memory();
+        let outcome = solve(&workspace, &abstraction, along(), &settings, &mut library, &());
+        let Ok(Outcome::Solved(solution)) = outcome else { panic!("{outcome:?}") };
+        let middle = prior::form(&workspace.robot, Expectation::new(&NoiseModel::nominal(), 0.5));
+        for PlannedLeg { leg, learnt, .. } in &solution.legs {
+            let OptionPolicy::Learnt { form, .. } = learnt.policy else { panic!("{}: a follower", leg.id) };
+            assert_eq!(form, middle, "{}", leg.id);
+            assert_eq!((learnt.verified.episodes, learnt.gradient_steps), (100, 0), "{}", leg.id);
+        }
+        assert!(solution.predicted.rate() > 0.8, "an open hall holds {:?}", solution.predicted);
     }
 
     #[test]

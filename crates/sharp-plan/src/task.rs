@@ -75,7 +75,7 @@ impl Environment for LegTask {
         let state = self.starts.draw(rng);
         // The caller's stream numbers the episode, so that a clone does not repeat its original.
         self.vehicle.reset(state, self.seed, rng.random());
-        let percept = Percept::first(state);
+        let percept = Percept::first(state, self.vehicle.noise());
         self.tracker = Tracker::start(&self.leg.guide, &state.pose);
         self.actions = 0;
         self.observe(&percept, observation);
@@ -87,7 +87,7 @@ impl Environment for LegTask {
         let pose = percept.state.pose;
         let command = self.form.waypoint(&self.workspace.robot, &pose, &self.tracker, &self.view(), action);
         let report = self.vehicle.act_at(command.to_world(&pose), command.speed_mps);
-        let percept = percept.next(command, report.after);
+        let percept = percept.next(&self.workspace, command, report.after);
         let before = self.tracker;
         self.tracker.update(&self.leg.guide, &percept.state.pose);
         self.actions += 1;

@@ -136,6 +136,8 @@ pub struct UpdateReport {
     pub entropy: f32,
     /// The temperature after the update.
     pub alpha: f32,
+    /// The temperature's loss.
+    pub alpha_loss: f32,
 }
 
 impl UpdateReport {
@@ -208,6 +210,7 @@ impl Sac {
 
         // J(α) = -log α (mean log π + H̄): grows while the policy is less random than asked.
         let alpha_gradient = -(actor.mean_log_probability + self.target_entropy);
+        let alpha_loss = state.log_alpha * alpha_gradient;
         let log_alpha = std::slice::from_mut(&mut state.log_alpha);
         state.alpha_adam.step(self.learning_rate, log_alpha, &[alpha_gradient]);
 
@@ -222,6 +225,7 @@ impl Sac {
             mean_q: critic.mean_q,
             entropy: -actor.mean_log_probability,
             alpha: state.alpha(),
+            alpha_loss,
         }
     }
 

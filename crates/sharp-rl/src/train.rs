@@ -152,6 +152,10 @@ pub struct Progress<'a> {
     pub recent_return: f64,
     /// Success rate of the same.
     pub recent_success_rate: f64,
+    /// Mean number of their steps.
+    pub recent_steps: f64,
+    /// Step of all three optimisers.
+    pub learning_rate: f32,
 }
 
 /// Why training failed.
@@ -573,13 +577,15 @@ impl<'a, E: Environment + Clone> Run<'a, E> {
 
     fn progress(&self, evaluation: Option<Evaluation>) -> Progress<'_> {
         let count = self.recent.len().max(1) as f64;
-        let successes = self.recent.iter().filter(|episode| episode.success).count();
+        let mean = |of: fn(&EpisodeSums) -> f64| self.recent.iter().map(of).sum::<f64>() / count;
         Progress {
             state: &self.state,
             report: self.report,
             evaluation,
-            recent_return: self.recent.iter().map(|episode| episode.total).sum::<f64>() / count,
-            recent_success_rate: successes as f64 / count,
+            recent_return: mean(|episode| episode.total),
+            recent_success_rate: mean(|episode| f64::from(u8::from(episode.success))),
+            recent_steps: mean(|episode| episode.steps as f64),
+            learning_rate: self.settings.sac.learning_rate,
         }
     }
 }

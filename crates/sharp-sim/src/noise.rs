@@ -21,6 +21,8 @@ const PATCH_M: f64 = 0.5;
 pub const STEER_PER_DRIFT_S: f64 = 0.3;
 /// A wheel that slips more does not drive at all.
 const SLIP_MAX: f64 = 0.95;
+/// The largest factor that a name may have: beyond it no built-in noise is one that a robot could drive with.
+const FACTOR_MAX: f64 = 10.0;
 
 /// Why a noise model was refused.
 #[derive(Debug, Error)]
@@ -38,6 +40,17 @@ pub enum NoiseError {
         value: f64,
         /// The largest value allowed.
         max: f64,
+    },
+    /// No built-in noise has this name.
+    #[error("noise is {0:?}, must be none, nominal, harsh or biased, also with a factor as in nominal*2")]
+    Name(String),
+    /// The number after a built-in noise's name is no factor.
+    #[error("noise {name:?}: the factor is {factor:?}, must be a number from 0 to {FACTOR_MAX}")]
+    Factor {
+        /// The whole name.
+        name: String,
+        /// What stands after the asterisk.
+        factor: String,
     },
 }
 
@@ -100,15 +113,24 @@ impl NoiseModel {
         Self::built_in(include_str!("../../../assets/noise/biased.ron"))
     }
 
-    /// One of [`NAMES`](Self::NAMES), or `None` for any other name.
-    #[must_use]
-    pub fn by_name(name: &str) -> Option<Self> {
-        match name {
-            "none" => Some(Self::none()),
-            "nominal" => Some(Self::nominal()),
-            "harsh" => Some(Self::harsh()),
-            "biased" => Some(Self::biased()),
-            _ => None,
+    /// One of [`NAMES`](Self::NAMES), or one of them [scaled](Self::scaled): `nominal*2`, `harsh*0.5`.
+    ///
+    /// # Errors
+    /// Returns [`NoiseError::Name`] for any other name and [`NoiseError::Factor`] for a factor that is no
+    /// number from 0 to 10.
+    pub fn by_name(name: &str) -> Result<Self, NoiseError> {
+        let (kind, factor) = name.split_once('*').map_or((name, None), |(kind, text)| (kind, Some(text)));
+        let noise = match kind {
+            "none" => Self::none(),
+            "nominal" => Self::nominal(),
+            "harsh" => Self::harsh(),
+            "biased" => Self::biased(),
+            _ => return Err(NoiseError::Name(name.to_owned())),
+        };
+        let Some(text) = factor else { return Ok(noise) };
+        match text.parse() {
+            Ok(factor) if (0.0..=FACTOR_MAX).contains(&factor) => Ok(noise.scaled(factor)),
+            _ => Err(NoiseError::Factor { name: name.to_owned(), factor: text.to_owned() }),
         }
     }
 
@@ -122,7 +144,7 @@ impl NoiseModel {
         Ok(noise)
     }
 
-    /// The same kinds of noise, `factor` times as strong; slips stay below 1.
+    /// The same kinds of noise, `factor` times as strong; slips stay below 1, and 0 leaves no noise.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self {
@@ -131,10 +153,13 @@ impl NoiseModel {
             drift_sd_radps: self.drift_sd_radps * factor,
             drift_bias_radps: self.drift_bias_radps * factor,
             waypoint_sd_m: self.waypoint_sd_m * factor,
-            slippery_patches: self.slippery_patches.map(|patches| SlipperyPatches {
-                extra_slip: (patches.extra_slip * factor).min(SLIP_MAX),
-                ..patches
-            }),
+            slippery_patches: self
+                .slippery_patches
+                .map(|patches| SlipperyPatches {
+                    extra_slip: (patches.extra_slip * factor).min(SLIP_MAX),
+                    ..patches
+                })
+                .filter(|patches| patches.extra_slip > 0.0),
             delay_s: self.delay_s * factor,
         }
     }
@@ -329,7 +354,9 @@ mod tests {
 
     #[test]
     fn scaling_keeps_the_kinds() {
-        assert_eq!(NoiseModel::nominal().scaled(0.0), NoiseModel::none());
+        for noise in [NoiseModel::nominal(), NoiseModel::harsh(), NoiseModel::biased()] {
+            assert_eq!(noise.scaled(0.0), NoiseModel::none(), "{noise:?}");
+        }
         assert_eq!(NoiseModel::nominal().scaled(1.0), NoiseModel::nominal());
         assert_eq!(NoiseModel::harsh().scaled(10.0).slip_max, SLIP_MAX, "slip stays below 1");
     }
@@ -337,9 +364,38 @@ mod tests {
     #[test]
     fn every_name_is_known() {
         for name in NoiseModel::NAMES {
-            assert!(NoiseModel::by_name(name).is_some(), "{name}");
+            assert!(NoiseModel::by_name(name).is_ok(), "{name}");
         }
-        assert_eq!(NoiseModel::by_name("loud"), None);
+    }
+
+    #[test]
+    fn names_may_have_a_factor() {
+        for (name, noise) in [
+            ("nominal*2", NoiseModel::nominal().scaled(2.0)),
+            ("harsh*0.5", NoiseModel::harsh().scaled(0.5)),
+            ("biased*1", NoiseModel::biased()),
+            ("nominal*0", NoiseModel::none()),
+        ] {
+            assert_eq!(NoiseModel::by_name(name).expect(name), noise, "{name}");
+        }
+        for factor in ["", "two", "-1", "10.5", "inf", "NaN", "2*2"] {
+            let name = format!("nominal*{factor}");
+            let error = NoiseModel::by_name(&name).expect_err(&name).to_string();
+            let expected = format!("noise {name:?}: the factor is {factor:?}, must be a number from 0 to 10");
+            assert_eq!(error, expected);
+        }
+        for name in ["loud", "loud*2", "*2", ""] {
+            let error = NoiseModel::by_name(name).expect_err(name).to_string();
+            assert!(error.starts_with(&format!("noise is {name:?}, must be none, nominal")), "{error}");
+        }
+    }
+
+    #[test]
+    fn every_noise_of_the_greatest_factor_is_valid() {
+        for name in NoiseModel::NAMES {
+            let noise = NoiseModel::by_name(&format!("{name}*{FACTOR_MAX}")).expect(name);
+            assert!(noise.validate().is_ok(), "{name}: {noise:?}");
+        }
     }
 
     #[test]

@@ -184,6 +184,11 @@ impl<S: Simulator> Vehicle<S> {
         &self.robot
     }
 
+    /// The noise that episodes are drawn from.
+    pub fn noise(&self) -> &NoiseModel {
+        &self.model
+    }
+
     /// How actions are timed.
     pub fn settings(&self) -> &ActionSettings {
         &self.settings

@@ -14,7 +14,7 @@ pub(crate) struct Eval {
     /// Where results are written; a run that was stopped goes on where it was.
     #[arg(long, value_name = "DIR", default_value = "out/eval")]
     pub(crate) out: PathBuf,
-    /// Results of other runs, for the figures: lines of a results.jsonl; those under other noise are left out.
+    /// Results of other runs, for the figures: the baselines in a results.jsonl.
     #[arg(long, value_name = "FILE.jsonl")]
     pub(crate) baselines: Option<PathBuf>,
     /// Who does the jobs: threads of this process, or a Slurm cluster.
@@ -47,7 +47,8 @@ pub(crate) struct Selection {
     /// How policies are learnt, separated by commas [default: fast; both in `paper`].
     #[arg(long, value_enum, value_delimiter = ',')]
     pub(crate) learning: Vec<Learning>,
-    /// none, nominal, harsh, biased or noise files (.ron), separated by commas.
+    /// none, nominal, harsh or biased, also with a factor as in nominal*2, or noise files (.ron), separated
+    /// by commas.
     #[arg(long, value_delimiter = ',', default_value = "nominal", value_name = "NAMES|FILES")]
     pub(crate) noise: Vec<String>,
     /// Only these maps of the suite: names, separated by commas.

@@ -1,17 +1,20 @@
 //! `sharp baseline`: the systems to compare with, on the same map, robot, noise and simulator.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::{
-    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, Query,
-    RoutePlanner, Rrt, Sac, SacBudget, Tally, Track, TrackSettings, Workspace, compare,
+    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, PacedFollower,
+    Query, RoutePlanner, Rrt, Sac, SacBudget, Tally, Track, Workspace, compare,
 };
+use sharp_rl::Progress;
 use sharp_sim::NoiseModel;
 use sharp_space::Seed;
 
 use crate::args::{Baseline, Collisions, Method};
+use crate::curves::CurveFolder;
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{Stopwatch, is_interrupted, spinner};
@@ -158,7 +161,7 @@ impl Bench<'_> {
                     planner: &planner,
                     query: *query,
                     route,
-                    settings: TrackSettings::new(robot, &noise),
+                    settings: PacedFollower::tuned(robot, &noise),
                     noise,
                 },
                 stopwatch,
@@ -182,7 +185,15 @@ impl Bench<'_> {
     ) -> Result<Measured, Failure> {
         stopwatch.enter("learn");
         let budget = SacBudget { max_env_steps: self.args.max_env_steps, horizon_s };
-        let learnt = Sac::learn(&self.workspace, self.query, (&self.settings.noise, self.seed), budget, stop)
+        let mut curves = self.args.tensorboard.as_deref().map(CurveFolder::new);
+        let mut observer = |progress: &Progress<'_>| {
+            if let Some(curves) = &mut curves {
+                curves.note("sac", progress);
+            }
+            if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let noise = (&self.settings.noise, self.seed);
+        let learnt = Sac::learn(&self.workspace, self.query, noise, budget, &mut observer)
             .map_err(|error| Failure::from(anyhow::Error::from(error)))?;
         // The limit is for learning: what was learnt is driven in any case.
         let driven = self.drive(&learnt, stopwatch, &is_interrupted);

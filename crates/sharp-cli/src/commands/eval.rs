@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::args::{Engine, Eval};
-use crate::evaluation::{self, BaselineLine, Evaluation, ResultLine, read_baselines, row_text};
+use crate::evaluation::{self, Evaluation, ResultLine, read_baselines, row_text};
 use crate::jobs::{
     Cluster, Job, Manifest, Merged, Submission, clean, command, count_results, is_queued, merge, run_jobs,
     specs, unfinished,
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
         eprintln!("interrupted; the same call goes on with {} results", merged.lines().count());
         return Ok(Exit::Interrupted);
     }
-    let page = write_report(&manifest, &merged, extra)?;
+    let page = write_report(&manifest, &merged, &extra)?;
     let lines: Vec<&ResultLine> =
         indices.iter().flat_map(|&index| &merged.results[index]).map(|done| &done.line).collect();
     if json {
@@ -61,19 +61,12 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
 pub(super) fn write_report(
     manifest: &Manifest,
     merged: &Merged,
-    extra: Vec<BaselineLine>,
+    extra: &[ResultLine],
 ) -> Result<PathBuf, Failure> {
-    let lines: Vec<&ResultLine> = merged.lines().collect();
-    evaluation::write_methods(&lines, &manifest.dir)?;
-    let (of_sharp, others): (Vec<&ResultLine>, Vec<&ResultLine>) =
-        lines.into_iter().partition(|line| line.is_of_sharp());
-    let mut baselines: Vec<BaselineLine> = others.into_iter().map(BaselineLine::from).collect();
-    baselines.extend(extra);
-    baselines.retain(|baseline| of_sharp.iter().any(|line| line.noise == baseline.noise));
+    let lines = merged.lines().chain(extra).collect();
     let mut commands: Vec<&str> = manifest.jobs.iter().map(|job| job.command.as_str()).collect();
     commands.dedup();
-    let command = commands.join("\n");
-    evaluation::write(&Evaluation { lines: of_sharp, baselines, command, out: &manifest.dir })
+    evaluation::write(&Evaluation { lines, command: commands.join("\n"), out: &manifest.dir })
 }
 
 fn show(args: &Eval, name: &str) -> String {

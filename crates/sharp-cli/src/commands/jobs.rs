@@ -92,7 +92,7 @@ fn merge_all(dir: &Path) -> Result<Exit, Failure> {
     for (_, failure) in &merged.missing {
         eprintln!("error: {failure}");
     }
-    let page = write_report(&manifest, &merged, vec![])?;
+    let page = write_report(&manifest, &merged, &[])?;
     say!(
         "{} results of {} whole jobs of {} in {}, report in {}",
         merged.lines().count(),

@@ -18,6 +18,7 @@ use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{GridFrame, OccupancyGrid, Pose, Seed, Stream};
 
 use crate::args::{PriorCommand, PriorScore, PriorTrain};
+use crate::curves::CurveFolder;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::{input, pipeline, progress};
 
@@ -144,7 +145,11 @@ fn learn(args: &PriorTrain, courses: &Arc<Vec<Course>>, seed: u64) -> Result<Opt
     let mut tasks: Vec<CourseTask> = (0..ENVIRONMENTS).map(task).collect();
     let bar = progress::bar(settings.max_env_steps, "learning");
     let mut interrupted = None;
+    let mut curves = args.tensorboard.as_deref().map(CurveFolder::new);
     let mut observer = |progress: &Progress<'_>| {
+        if let Some(curves) = &mut curves {
+            curves.note("prior", progress);
+        }
         bar.set_position(progress.state.env_steps);
         if let Some(evaluation) = progress.evaluation {
             let (steps, rate) = (progress.state.env_steps, evaluation.success_rate());

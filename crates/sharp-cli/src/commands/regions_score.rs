@@ -22,7 +22,7 @@ use crate::pipeline::BLIND_RADIUS_M;
 use crate::{input, pipeline, progress};
 
 /// Thresholds that calibration tries.
-const THRESHOLDS: [f64; 7] = [0.2, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6];
+const THRESHOLDS: [f64; 7] = [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /// Thresholds at doorways that calibration tries; with the last no doorway counts as such.
 const DOORWAY_THRESHOLDS: [f64; 6] = [0.02, 0.05, 0.1, 0.15, 0.25, 1.1];
 

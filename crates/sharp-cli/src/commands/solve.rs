@@ -11,7 +11,7 @@ use sharp_plan::{
 };
 use sharp_space::Seed;
 
-use crate::args::{Guide, Learning, Solve};
+use crate::args::{Guide, Learning, Solve, Switch};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::pipeline::{self, Built};
 use crate::progress::{SolveMonitor, Stopwatch, is_interrupted, spinner};
@@ -23,6 +23,7 @@ impl From<Learning> for LearningMode {
         match learning {
             Learning::Fast => Self::Fast,
             Learning::Paper => Self::Paper,
+            Learning::Prior => Self::Prior,
         }
     }
 }
@@ -65,10 +66,12 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     let built = pipeline::abstraction(&workspace, &args.abstraction, cache.as_deref(), &mut stopwatch)?;
     let abstraction = built.file.abstraction();
     let mut settings = SolveSettings::new(&workspace, args.learning.into(), noise.clone(), Seed(seed));
+    settings.search.cost_update = args.cost_update == Switch::On;
     if args.guide == Guide::Paper {
         settings.search.guide.planner = GuidePlanner::LearnAndLink;
     }
-    let monitor = SolveMonitor::new(stopwatch, time_limit, spinner);
+    let curves = args.tensorboard.as_deref();
+    let monitor = SolveMonitor::new(stopwatch, time_limit, spinner, curves);
     let outcome = solve(&workspace, &abstraction, query, &settings, &mut library, &monitor)?;
     let stopwatch = monitor.into_stopwatch();
 
@@ -78,6 +81,7 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
         abstraction: abstraction.clone(),
         noise: noise.clone(),
         learning: args.learning.into(),
+        cost_update: args.cost_update == Switch::On,
         seed: Seed(seed),
         solution,
     };
@@ -126,10 +130,8 @@ fn blank_report(
         reason: None,
         robot: workspace.robot.name.clone(),
         options: sharp_plan::kind_name(built.file.kind),
-        learning: match args.learning {
-            Learning::Fast => "fast",
-            Learning::Paper => "paper",
-        },
+        learning: args.learning.name(),
+        cost_update: args.cost_update.name(),
         noise: args.noise.clone(),
         seed,
         map: MapReport::new(&map.name, &map.grid),
@@ -183,13 +185,14 @@ fn write_plan(
 
 fn print_report(report: &SolveReport) {
     say!(
-        "{}: {} on map {}, {} options, {} noise, {} learning",
+        "{}: {} on map {}, {} options, {} noise, {} learning{}",
         report.status,
         report.robot,
         report.map.name,
         report.options,
         report.noise,
-        report.learning
+        report.learning,
+        if report.cost_update == Switch::Off.name() { ", no cost update" } else { "" }
     );
     say!(
         "{} abstract states (regions: {}), {} options",

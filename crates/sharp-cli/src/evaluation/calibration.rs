@@ -1,8 +1,11 @@
 //! The figure of calibration: the success that SHARP foretold against the success that was counted.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
-use super::figure::{Axis, Figure, INK, Panel, SOFT, Style, TEXT, Table, legend, percent};
+use sharp_plan::Tally;
+
+use super::cases::{Mean, tally};
+use super::figure::{Axis, Figure, INK, Panel, SOFT, Style, TEXT, Table, legend, marker, percent};
 use super::lines::ResultLine;
 use crate::render::Anchor;
 
@@ -10,37 +13,67 @@ use crate::render::Anchor;
 const AREA: [f64; 4] = [46.0, 336.0, 32.0, 322.0];
 const HEIGHT: f64 = 368.0;
 
+/// All problems of one environment, robot and kind of option.
+#[derive(Debug)]
+struct Point<'a> {
+    robot: &'a str,
+    options: &'a str,
+    /// Mean over the problems.
+    predicted: f64,
+    measured: Tally,
+}
+
 pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
     let solved: Vec<&ResultLine> = lines.iter().copied().filter(|line| line.is_solved()).collect();
-    let inside = solved.iter().filter(|line| is_inside(line)).count();
-    let robots: BTreeSet<&str> = solved.iter().map(|line| line.robot.as_str()).collect();
-    let low = lowest(&solved);
-    let of = |robot: &str| solved.iter().copied().filter(|line| line.robot == robot).collect::<Vec<_>>();
+    let points = points(&solved);
+    let low = lowest(&points);
+    let columns =
+        "env,robot,options,problem,trial,predicted,measured,95 % interval,inside,within 3 points".split(',');
     Figure {
         name: "calibration",
         title: "Predicted and measured success",
-        caption: format!(
-            "One marker a solved problem: the success predicted when it was solved, and the share counted \
-             afterwards on executions with fresh noise, with Wilson's 95 % interval. Predictions that were \
-             right lie on the diagonal. {inside} of {} predictions lie in the interval measured.",
-            solved.len()
-        ),
+        caption: caption(&solved),
         legend: legend(solved.iter().map(|line| line.options.as_str())),
-        panels: robots.into_iter().map(|robot| panel(robot, &of(robot), low)).collect(),
-        table: Table {
-            columns: vec![
-                "env",
-                "robot",
-                "options",
-                "problem",
-                "predicted",
-                "measured",
-                "95 % interval",
-                "inside",
-            ],
-            rows: solved.iter().map(|line| row(line)).collect(),
-        },
+        panels: points.chunk_by(|a, b| a.robot == b.robot).map(|points| panel(points, low)).collect(),
+        table: Table { columns: columns.collect(), rows: solved.iter().map(|line| row(line)).collect() },
     }
+}
+
+fn caption(solved: &[&ResultLine]) -> String {
+    let inside = solved.iter().filter(|line| is_inside(line)).count();
+    let near = solved.iter().filter(|line| is_near(line)).count();
+    let (count, measured) = (solved.len(), tally(solved));
+    format!(
+        "One marker an environment and kind of option: the success predicted when its problems were solved, \
+         and the share counted afterwards on executions with fresh noise, with Wilson's 95 % interval. \
+         Predictions that were right lie on the diagonal. Problem by problem {near} of {count} predictions ({}) \
+         are within 3 points of what was measured, {inside} of {count} lie in the interval measured. All \
+         together: {:.1} % predicted, {:.1} % measured ({:.1} to {:.1} %).",
+        percent(near as f64 / count.max(1) as f64),
+        100.0 * predicted(solved),
+        100.0 * measured.rate(),
+        100.0 * measured.lower95(),
+        100.0 * measured.upper95()
+    )
+}
+
+fn points<'a>(solved: &[&'a ResultLine]) -> Vec<Point<'a>> {
+    let mut groups: BTreeMap<_, Vec<&'a ResultLine>> = BTreeMap::new();
+    for &line in solved {
+        groups.entry((&*line.robot, &*line.env, &*line.options)).or_default().push(line);
+    }
+    let point = |((robot, _, options), lines): ((&'a str, &str, &'a str), Vec<&ResultLine>)| Point {
+        robot,
+        options,
+        predicted: predicted(&lines),
+        measured: tally(&lines),
+    };
+    groups.into_iter().map(point).collect()
+}
+
+/// The mean of what was predicted; 0 of nothing.
+fn predicted(lines: &[&ResultLine]) -> f64 {
+    Mean::of(lines.iter().map(|line| line.predicted_success)).unwrap_or_default().mean
 }
 
 /// Returns true if the prediction lies in the interval that was measured.
@@ -49,9 +82,18 @@ fn is_inside(line: &ResultLine) -> bool {
     (tally.lower95()..=tally.upper95()).contains(&line.predicted_success)
 }
 
+/// Returns true if prediction and measurement are at most 3 points apart.
+fn is_near(line: &ResultLine) -> bool {
+    (line.predicted_success - line.tally().rate()).abs() <= 0.03 + 1e-9
+}
+
+fn yes_or_no(yes: bool) -> String {
+    if yes { "yes" } else { "no" }.to_owned()
+}
+
 /// The tenth at or below everything that is shown: what is near 1 can be told apart.
-fn lowest(lines: &[&ResultLine]) -> f64 {
-    let low = lines.iter().map(|line| line.tally().lower95().min(line.predicted_success)).fold(0.9, f64::min);
+fn lowest(points: &[Point<'_>]) -> f64 {
+    let low = points.iter().map(|point| point.measured.lower95().min(point.predicted)).fold(0.9, f64::min);
     ((low * 10.0).floor() / 10.0).clamp(0.0, 0.9)
 }
 
@@ -62,29 +104,31 @@ fn row(line: &ResultLine) -> Vec<String> {
         line.robot.clone(),
         line.options.clone(),
         format!("P{}", line.problem),
+        line.trial.to_string(),
         format!("{:.3}", line.predicted_success),
         format!("{:.3}", tally.rate()),
         format!("{:.3}-{:.3}", tally.lower95(), tally.upper95()),
-        if is_inside(line) { "yes" } else { "no" }.to_owned(),
+        yes_or_no(is_inside(line)),
+        yes_or_no(is_near(line)),
     ]
 }
 
-fn panel(robot: &str, lines: &[&ResultLine], low: f64) -> Panel {
+/// The points of one robot.
+fn panel(points: &[Point<'_>], low: f64) -> Panel {
     let [left, right, top, bottom] = AREA;
-    let across = Axis { low, high: 1.0, ends: [left, right] };
-    let up = Axis { low, high: 1.0, ends: [bottom, top] };
-    let mut panel = Panel::new(robot.to_owned(), HEIGHT);
+    let across = Axis::new([low, 1.0], [left, right]);
+    let up = Axis::new([low, 1.0], [bottom, top]);
+    let mut panel = Panel::new(points[0].robot.to_owned(), HEIGHT);
     let chart = &mut panel.chart;
     across.draw(chart, [top, bottom], percent);
     up.draw_upright(chart, [left, right], percent);
     chart.line([left, bottom], [right, top], SOFT, 1.0);
     chart.text([(left + right) / 2.0, bottom + 32.0], Anchor::Middle, TEXT, INK, "predicted success");
     chart.text([right, top - 10.0], Anchor::End, TEXT, INK, "measured success, upwards");
-    for line in lines {
-        let (tally, style) = (line.tally(), Style::of(&line.options));
-        let x = across.at(line.predicted_success);
-        chart.line([x, up.at(tally.lower95())], [x, up.at(tally.upper95())], style.color, 1.0);
-        chart.marker([x, up.at(tally.rate())], style.shape, 3.6, style.color);
+    for Point { options, predicted, measured, .. } in points {
+        let (x, style) = (across.at(*predicted), Style::of(options));
+        chart.line([x, up.at(measured.lower95())], [x, up.at(measured.upper95())], style.color, 1.0);
+        marker(chart, [x, up.at(measured.rate())], &style, false);
     }
     panel
 }
@@ -100,11 +144,13 @@ mod tests {
         let none =
             ResultLine { status: "no_plan".into(), ..ResultLine::example("a", "husky", "centroid", 3) };
         let figure = figure(&[&right, &wrong, &none]);
-        assert!(
-            figure.caption.ends_with("1 of 2 predictions lie in the interval measured."),
-            "{}",
-            figure.caption
-        );
+        for needle in [
+            "1 of 2 predictions (50 %) are within 3 points",
+            "1 of 2 lie in the interval measured",
+            "98.0 % predicted, 75.0 % measured (59.8 to 85.8 %)",
+        ] {
+            assert!(figure.caption.contains(needle), "no {needle:?} in {}", figure.caption);
+        }
         let titles: Vec<&str> = figure.panels.iter().map(|panel| panel.title.as_str()).collect();
         assert_eq!(titles, ["limo"]);
     }
@@ -112,7 +158,7 @@ mod tests {
     #[test]
     fn the_axes_show_every_interval() {
         let wrong = ResultLine { successes: 10, ..ResultLine::example("a", "limo", "centroid", 2) };
-        assert!(lowest(&[&wrong]) <= wrong.tally().lower95());
+        assert!(lowest(&points(&[&wrong])) <= wrong.tally().lower95());
         assert_eq!(lowest(&[]), 0.9, "nothing to show");
     }
 }

@@ -24,6 +24,8 @@ pub(super) const SOFT: &str = "#595959";
 /// Pixels of a PNG per user unit.
 const PNG_SCALE: f64 = 2.0;
 const RULE: &str = "#dcdcdc";
+/// Radius of a marker, user units.
+const MARKER: f64 = 3.6;
 
 /// One figure of the page.
 #[derive(Debug)]
@@ -88,11 +90,30 @@ impl Panel {
 pub(super) struct Axis {
     pub(super) low: f64,
     pub(super) high: f64,
+    /// Between two values that are written.
+    pub(super) step: f64,
     /// Where `low` and `high` are, user units.
     pub(super) ends: [f64; 2],
 }
 
 impl Axis {
+    /// An axis with round values from `low` to `high`.
+    pub(super) fn new([low, high]: [f64; 2], ends: [f64; 2]) -> Self {
+        Self { low, high, step: round_step(high - low), ends }
+    }
+
+    /// A horizontal axis of shares.
+    pub(super) fn of_shares() -> Self {
+        Self::new([0.0, 1.0], [LEFT, RIGHT])
+    }
+
+    /// A horizontal axis of decimal logarithms that shows everything from `least` to `most`: whole
+    /// decades, at least one.
+    pub(super) fn decades(least: f64, most: f64) -> Self {
+        let low = least.floor();
+        Self { low, high: most.ceil().max(low + 1.0), step: 1.0, ends: [LEFT, RIGHT] }
+    }
+
     /// Where `value` is; values outside stop at the ends.
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
@@ -102,16 +123,15 @@ impl Axis {
     /// A horizontal axis from zero to the next round value above `most`, at least 1.
     pub(super) fn from_zero(most: f64) -> Self {
         let most = most.max(1.0);
-        let step = step(most);
-        Self { low: 0.0, high: (most / step).ceil() * step, ends: [LEFT, RIGHT] }
+        let step = round_step(most);
+        Self { low: 0.0, high: (most / step).ceil() * step, step, ends: [LEFT, RIGHT] }
     }
 
     /// Round values from `low` to `high`, at most seven.
     pub(super) fn ticks(&self) -> Vec<f64> {
-        let step = step(self.high - self.low);
-        let first = (self.low / step).round();
-        let count = ((self.high - self.low) / step).round() as u32;
-        (0..=count).map(|i| (first + f64::from(i)) * step).collect()
+        let first = (self.low / self.step).round();
+        let count = ((self.high - self.low) / self.step).round() as u32;
+        (0..=count).map(|i| (first + f64::from(i)) * self.step).collect()
     }
 
     /// Draws rules from `top` to `bottom` with their values, as `text` writes them, below.
@@ -139,7 +159,7 @@ impl Axis {
 }
 
 /// A round step (1, 2 or 5 times a power of ten) that divides `range` into at most six parts.
-fn step(range: f64) -> f64 {
+fn round_step(range: f64) -> f64 {
     let rough = range / 5.0;
     let power = 10_f64.powf(rough.log10().floor());
     [1.0, 2.0, 5.0, 10.0]
@@ -149,9 +169,18 @@ fn step(range: f64) -> f64 {
         .unwrap_or(power)
 }
 
+/// Draws the marker of `style`; hollow ones are for what came to nothing.
+pub(super) fn marker(chart: &mut Chart, at: [f64; 2], style: &Style, hollow: bool) {
+    chart.marker(at, style.shape, MARKER, style.color);
+    if hollow {
+        chart.marker(at, style.shape, 0.55 * MARKER, "#fff");
+    }
+}
+
 /// A number of seconds, short.
 pub(super) fn seconds(value: f64) -> String {
-    if value >= 100.0 { format!("{value:.0} s") } else { format!("{value:.1} s") }
+    let decimals = if value >= 100.0 { 0 } else { usize::from(value < 1.0) + 1 };
+    format!("{value:.decimals$} s")
 }
 
 /// A number as it would be said, without what rounding left.
@@ -175,7 +204,7 @@ pub(super) struct Style {
     pub(super) shape: Shape,
 }
 
-const STYLES: [Style; 8] = [
+const STYLES: [Style; 9] = [
     Style { name: "centroid", label: "SHARP centroid", color: "#0072b2", shape: Shape::Circle },
     Style { name: "interface", label: "SHARP interface", color: "#d55e00", shape: Shape::Diamond },
     Style { name: "rrt", label: "RRT", color: "#707070", shape: Shape::Square },
@@ -183,6 +212,7 @@ const STYLES: [Style; 8] = [
     Style { name: "track", label: "tracking", color: "#009e73", shape: Shape::Up },
     Style { name: "mppi", label: "MPPI", color: "#e69f00", shape: Shape::Down },
     Style { name: "sac", label: "flat SAC", color: "#56b4e9", shape: Shape::Star },
+    Style { name: "paper", label: "in the paper", color: "#999999", shape: Shape::Star },
     Style { name: "", label: "other", color: "#1a1a1a", shape: Shape::Star },
 ];
 
@@ -243,8 +273,21 @@ mod tests {
     }
 
     #[test]
+    fn times_have_as_many_decimals_as_their_size_deserves() {
+        assert_eq!([0.042, 1.0, 99.94, 213.4].map(seconds), ["0.04 s", "1.0 s", "99.9 s", "213 s"]);
+    }
+
+    #[test]
+    fn decades_are_whole() {
+        for (ends, ticks) in [([-0.5, 2.9], "-1 0 1 2 3"), ([1.0, 1.0], "1 2"), ([0.2, 0.4], "0 1")] {
+            let texts: Vec<String> = Axis::decades(ends[0], ends[1]).ticks().into_iter().map(plain).collect();
+            assert_eq!(texts.join(" "), ticks, "{ends:?}");
+        }
+    }
+
+    #[test]
     fn values_outside_an_axis_stop_at_its_ends() {
-        let axis = Axis { low: 0.5, high: 1.0, ends: [10.0, 20.0] };
+        let axis = Axis::new([0.5, 1.0], [10.0, 20.0]);
         assert_eq!([0.2, 0.75, 3.0].map(|value| axis.at(value)), [10.0, 15.0, 20.0]);
     }
 

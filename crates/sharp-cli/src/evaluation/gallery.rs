@@ -1,71 +1,109 @@
-//! Pictures for the page: the abstraction and the drives of one problem of each environment and kind.
+//! Pictures for the page: the abstraction (appendix A) and the drives of one problem of each environment
+//! and kind.
 
 use std::path::Path;
 
-use super::Evaluation;
 use super::lines::ResultLine;
 use crate::outcome::Failure;
+
+/// Pictures of one sort.
+#[derive(Debug)]
+pub(super) struct Gallery {
+    /// Its place in the page.
+    pub(super) name: &'static str,
+    pub(super) title: &'static str,
+    /// How to read it.
+    pub(super) text: &'static str,
+    pub(super) pictures: Vec<Picture>,
+}
 
 /// A picture that travels inside the page.
 #[derive(Debug)]
 pub(super) struct Picture {
-    /// Its place in the page.
-    pub(super) id: String,
+    /// Its place in the page, and the name of its file.
+    pub(super) name: String,
     pub(super) caption: String,
     /// The picture itself, as a data URI.
     pub(super) uri: String,
+    /// Its PNG, for a file beside the page.
+    pub(super) png: Vec<u8>,
 }
 
-/// What is shown of a plan: the file and what it shows. The abstraction is smaller as SVG, the drives
-/// are smaller as PNG.
-const SHOWN: [(&str, &str, &str); 2] =
-    [("abstraction.svg", "image/svg+xml", "abstraction"), ("run.png", "image/png", "executions")];
-
-/// The pictures of the first solved problem of each environment and kind; pictures that are gone are left out.
+/// Both galleries, with pictures of the first solved problem of each environment and kind in `lines`,
+/// whose plans lie below `out`; pictures that are gone are left out.
 ///
 /// # Errors
 /// Returns an error if a picture is there but cannot be read.
-pub(super) fn collect(evaluation: &Evaluation<'_>) -> Result<Vec<Picture>, Failure> {
+pub(super) fn collect(lines: &[&ResultLine], out: &Path) -> Result<[Gallery; 2], Failure> {
     let mut shown: Vec<&ResultLine> = Vec::new();
-    for line in evaluation.lines.iter().filter(|line| line.is_solved()) {
+    for line in lines.iter().filter(|line| line.is_solved()) {
         if !shown.iter().any(|other| (&other.env, &other.options) == (&line.env, &line.options)) {
             shown.push(line);
         }
     }
     shown.sort_by_key(|line| (&line.env, &line.options));
+    Ok([abstractions(&shown, out)?, executions(&shown, out)?])
+}
+
+fn abstractions(lines: &[&ResultLine], out: &Path) -> Result<Gallery, Failure> {
     let mut pictures = Vec::new();
-    for line in shown {
-        let folder = line.plan_folder(evaluation.out);
-        for (file, kind, what) in SHOWN {
-            let number = pictures.len() + 1;
-            pictures.extend(read(&folder.join(file), kind)?.map(|uri| Picture {
-                id: format!("picture-{number}"),
-                caption: caption(line, what),
-                uri,
-            }));
+    for line in lines {
+        let ResultLine { env, options, robot, .. } = line;
+        let folder = line.plan_folder(out);
+        let files = (read(&folder.join("abstraction.svg"))?, read(&folder.join("abstraction.png"))?);
+        if let (Some(svg), Some(png)) = files {
+            pictures.push(Picture {
+                name: format!("abstraction-{env}-{options}"),
+                caption: format!("{env}, {options} options for {robot}"),
+                // Smaller than the PNG, and sharp at every size.
+                uri: uri("image/svg+xml", &svg),
+                png,
+            });
         }
     }
-    Ok(pictures)
+    Ok(Gallery {
+        name: "abstractions",
+        title: "Abstract states and options (appendix A)",
+        text: "Each colour is an abstract state, a cell of the region-based Voronoi diagram; outlines are critical \
+               regions. White circles are what options connect: centroids of critical regions, or interfaces \
+               between two states. A picture opens large.",
+        pictures,
+    })
 }
 
-fn caption(line: &ResultLine, what: &str) -> String {
-    let ResultLine { env, options, robot, problem, successes, episodes, .. } = line;
-    match what {
-        "executions" => {
-            format!(
+fn executions(lines: &[&ResultLine], out: &Path) -> Result<Gallery, Failure> {
+    let mut pictures = Vec::new();
+    for line in lines {
+        let ResultLine { env, options, robot, problem, successes, episodes, .. } = line;
+        pictures.extend(read(&line.plan_folder(out).join("run.png"))?.map(|png| Picture {
+            name: format!("executions-{env}-{options}"),
+            caption: format!(
                 "{env}, {options}: {robot}, problem {problem}, {successes} of {episodes} executions arrived"
-            )
-        }
-        _ => format!("{env}, {options}: {what} for {robot}"),
+            ),
+            uri: uri("image/png", &png),
+            png,
+        }));
     }
+    Ok(Gallery {
+        name: "executions",
+        title: "Trajectories",
+        text: "All executions of one problem of each environment and kind of option: guides blue, arrivals green, \
+               failures red. A picture opens large.",
+        pictures,
+    })
 }
 
-fn read(path: &Path, kind: &str) -> Result<Option<String>, Failure> {
+/// The bytes of `path`; `None` if there is no such file.
+fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
     match std::fs::read(path) {
-        Ok(bytes) => Ok(Some(format!("data:{kind};base64,{}", base64(&bytes)))),
+        Ok(bytes) => Ok(Some(bytes)),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(Failure::new("FILE_INVALID", format!("{}: {error}", path.display()))),
     }
+}
+
+fn uri(kind: &str, bytes: &[u8]) -> String {
+    format!("data:{kind};base64,{}", base64(bytes))
 }
 
 /// RFC 4648, with padding.
@@ -117,14 +155,12 @@ mod tests {
             std::fs::create_dir_all(&plan).expect("a folder");
             std::fs::write(plan.join("run.png"), "png").expect("a file");
         }
-        let evaluation = Evaluation {
-            lines: lines.iter().collect(),
-            baselines: vec![],
-            command: String::new(),
-            out: folder.path(),
-        };
-        let pictures = collect(&evaluation).expect("pictures");
-        let captions: Vec<&str> = pictures.iter().map(|picture| picture.caption.as_str()).collect();
+        let svg = lines[1].plan_folder(folder.path());
+        std::fs::write(svg.join("abstraction.svg"), "svg").expect("a file");
+        std::fs::write(svg.join("abstraction.png"), "png").expect("a file");
+        let lines: Vec<&ResultLine> = lines.iter().collect();
+        let [abstractions, executions] = collect(&lines, folder.path()).expect("pictures");
+        let captions: Vec<&str> = executions.pictures.iter().map(|picture| &*picture.caption).collect();
         assert_eq!(
             captions,
             [
@@ -132,6 +168,9 @@ mod tests {
                 "a, interface: limo, problem 1, 20 of 20 executions arrived"
             ]
         );
-        assert_eq!(pictures[0].uri, "data:image/png;base64,cG5n");
+        assert_eq!(executions.pictures[0].uri, "data:image/png;base64,cG5n");
+        assert_eq!(abstractions.pictures.len(), 1, "the other one is gone");
+        assert_eq!(abstractions.pictures[0].name, "abstraction-a-centroid");
+        assert_eq!(abstractions.pictures[0].uri, "data:image/svg+xml;base64,c3Zn");
     }
 }

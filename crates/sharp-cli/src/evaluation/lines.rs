@@ -112,59 +112,23 @@ pub(crate) fn problem_folder(out: &Path, job: &str, problem: usize) -> PathBuf {
     out.join("jobs").join(job).join(format!("p{problem}"))
 }
 
-/// What a report shows of a system to compare with.
-#[derive(Clone, Debug)]
-pub(crate) struct BaselineLine {
-    pub(crate) method: String,
-    pub(crate) noise: String,
-    pub(crate) env: String,
-    pub(crate) robot: String,
-    pub(crate) problem: usize,
-    pub(crate) report: BaselineCounts,
-}
-
-/// How its executions ended.
-#[derive(Clone, Debug)]
-pub(crate) struct BaselineCounts {
-    pub(crate) episodes: u32,
-    pub(crate) successes: u32,
-    /// Simulated seconds of successful executions, mean; 0 without any.
-    pub(crate) mean_sim_time_s: f64,
-}
-
-impl From<&ResultLine> for BaselineLine {
-    fn from(line: &ResultLine) -> Self {
-        Self {
-            method: line.method.clone(),
-            noise: line.noise.clone(),
-            env: line.env.clone(),
-            robot: line.robot.clone(),
-            problem: line.problem,
-            report: BaselineCounts {
-                episodes: line.episodes,
-                successes: line.successes,
-                mean_sim_time_s: line.mean_sim_time_s,
-            },
-        }
-    }
-}
-
 /// The baselines among the results in `path`; a last line that is still being written is left out.
 ///
 /// # Errors
 /// Returns an error if there is no such file, or that names the first line that is no result.
-pub(crate) fn read_baselines(path: &Path) -> Result<Vec<BaselineLine>, Failure> {
+pub(crate) fn read_baselines(path: &Path) -> Result<Vec<ResultLine>, Failure> {
     let broken = |problem: String| Failure::new("FILE_INVALID", format!("{}{problem}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| broken(format!(": {error}")))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-    let lines: Vec<ResultLine> = whole
+    let mut lines: Vec<ResultLine> = whole
         .lines()
         .enumerate()
         .map(|(index, line)| {
             serde_json::from_str(line).map_err(|error| broken(format!(" line {}: {error}", index + 1)))
         })
         .collect::<Result<_, _>>()?;
-    Ok(lines.iter().filter(|line| !line.is_of_sharp()).map(BaselineLine::from).collect())
+    lines.retain(|line| !line.is_of_sharp());
+    Ok(lines)
 }
 
 /// One result for the terminal.
@@ -241,7 +205,7 @@ mod tests {
         std::fs::write(&path, format!("{of_sharp}\n{line}\n{}", &line[..30])).expect("a file");
         let lines = read_baselines(&path).expect("whole lines");
         assert_eq!(lines.len(), 1, "one is of SHARP, one is cut short: {lines:?}");
-        assert_eq!((lines[0].problem, lines[0].report.episodes), (3, 20), "{lines:?}");
+        assert_eq!((lines[0].problem, lines[0].episodes), (3, 20), "{lines:?}");
         std::fs::write(&path, format!("{line}\n{{}}\n")).expect("a file");
         let error = read_baselines(&path).expect_err("a line without a schema").to_string();
         assert!(error.contains("baselines.jsonl line 2: missing field `schema`"), "{error}");

@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use sharp_plan::Tally;
 
+use super::cases::ready_s;
 use super::lines::{ResultLine, default_regions};
 
 /// Sums over some results.
@@ -29,8 +30,7 @@ impl Sum {
         self.collisions += line.collisions;
         self.timeouts += line.timeouts;
         self.sim_s += f64::from(line.successes) * line.mean_sim_time_s;
-        let times = &line.time_s;
-        self.ready_s += if line.is_of_sharp() { times.total } else { times.plan + times.learn };
+        self.ready_s += ready_s(line);
         self.decision_us += line.decision_us.p50;
         self.results += 1;
     }

@@ -3,26 +3,33 @@
 //! Everything here is a function of `results.jsonl` and of the pictures beside the plans: equal results
 //! give equal bytes.
 
+mod ablations;
 mod calibration;
+mod cases;
 mod figure;
 mod gallery;
 mod lines;
 mod methods;
+mod missing;
+mod noise;
+mod ompl;
 mod page;
+mod phases;
 mod reuse;
 mod rows;
 mod tables;
-mod time;
 
 use std::path::{Path, PathBuf};
 
 use sharp_plan::write_atomic;
 
+use self::cases::Results;
+use self::figure::Figure;
 use crate::outcome::Failure;
 use crate::render::svg_to_png;
 
 pub(crate) use lines::{
-    BaselineLine, Machine, ResultLine, default_regions, problem_folder, read_baselines, row_text, variant,
+    Machine, ResultLine, default_regions, problem_folder, read_baselines, row_text, variant,
 };
 pub(crate) use methods::totals;
 pub(crate) use tables::table;
@@ -30,70 +37,99 @@ pub(crate) use tables::table;
 /// What a report is made from.
 #[derive(Debug)]
 pub(crate) struct Evaluation<'a> {
-    /// Problems in the order of the suite.
+    /// All results there are, of SHARP in any setting and of the baselines.
     pub(crate) lines: Vec<&'a ResultLine>,
-    /// Baselines under the same noise; may be empty.
-    pub(crate) baselines: Vec<BaselineLine>,
     /// The command that makes the same report again.
     pub(crate) command: String,
     /// Where the plans of `lines` lie.
     pub(crate) out: &'a Path,
 }
 
-/// Writes `methods.md`, all methods under each noise, into `OUT/report`.
-///
-/// # Errors
-/// Returns an error if the file cannot be written.
-pub(crate) fn write_methods(lines: &[&ResultLine], out: &Path) -> Result<(), Failure> {
-    Ok(write_atomic(&out.join("report/methods.md"), methods::tables(lines).as_bytes())?)
-}
-
-/// Writes `tables.md`, every figure as SVG and PNG, and `index.html` into `OUT/report`; returns the
-/// path of the page.
+/// Writes `tables.md`, `methods.md`, `ompl.log`, every figure as SVG and PNG, every picture as PNG, and
+/// `index.html` into `OUT/report`; returns the path of the page.
 ///
 /// # Errors
 /// Returns an error if a picture of a plan cannot be read or a file cannot be written.
 pub(crate) fn write(evaluation: &Evaluation<'_>) -> Result<PathBuf, Failure> {
     let folder = evaluation.out.join("report");
-    write_atomic(&folder.join("tables.md"), table(&evaluation.lines).as_bytes())?;
-    let figures = figures(evaluation);
+    let results = Results::new(&evaluation.lines);
+    let figures = figures(&results);
     for figure in &figures {
         let (plain, side_px) = figure.to_plain_svg();
         write_atomic(&folder.join(format!("{}.svg", figure.name)), figure.to_svg().as_bytes())?;
         write_atomic(&folder.join(format!("{}.png", figure.name)), &svg_to_png(&plain, side_px)?)?;
     }
-    let pictures = gallery::collect(evaluation)?;
+    let galleries = gallery::collect(&results.sharp(results.main), evaluation.out)?;
+    for picture in galleries.iter().flat_map(|gallery| &gallery.pictures) {
+        write_atomic(&folder.join(format!("{}.png", picture.name)), &picture.png)?;
+    }
+    write_atomic(&folder.join("methods.md"), methods::tables(&results.lines).as_bytes())?;
+    write_atomic(&folder.join("ompl.log"), ompl::log(&results.lines).as_bytes())?;
+    let missing = missing::missing(&results, evaluation.out);
+    write_atomic(&folder.join("tables.md"), tables::document(&results, &figures).as_bytes())?;
     let page = folder.join("index.html");
-    write_atomic(&page, page::html(evaluation, &figures, &pictures).as_bytes())?;
+    let parts = page::Parts { results, command: &evaluation.command, figures, galleries, missing };
+    write_atomic(&page, page::html(&parts).as_bytes())?;
     Ok(page)
 }
 
-/// All figures, in the order of the page.
-fn figures(evaluation: &Evaluation<'_>) -> Vec<figure::Figure> {
-    let (lines, baselines) = (&evaluation.lines, &evaluation.baselines);
-    vec![
-        time::figure(lines),
-        rows::success(lines, baselines),
-        calibration::figure(lines),
-        reuse::figure(lines),
-        rows::driving(lines, baselines),
-    ]
+/// The environment that the paper shows apart, in its appendix B.
+const APART: &str = "d";
+
+/// All figures that have something to show, in the order of the page.
+fn figures(results: &Results<'_>) -> Vec<Figure> {
+    let sharp = results.sharp(results.main);
+    if sharp.is_empty() {
+        return vec![];
+    }
+    let compared = results.compared();
+    let (apart, others): (Vec<_>, Vec<_>) = compared.iter().copied().partition(|line| line.env == APART);
+    let there = |lines: &[&ResultLine]| !lines.is_empty();
+    let figures = [
+        there(&others).then(|| rows::time("time", "Time until it can drive", &others)),
+        there(&others).then(|| rows::success("success", "Success of each problem", &others)),
+        Some(phases::figure(&sharp)),
+        Some(rows::driving(&compared)),
+        Some(calibration::figure(&sharp)),
+        noise::figure(results),
+        ablations::figure(results),
+        there(&apart).then(|| rows::time("time-d", "Environment D: time (appendix B)", &apart)),
+        there(&apart).then(|| rows::success("success-d", "Environment D: success (appendix B)", &apart)),
+        Some(reuse::figure(&sharp)),
+    ];
+    figures.into_iter().flatten().collect()
 }
+
+#[cfg(test)]
+mod browser;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn evaluate(lines: &[ResultLine], out: &Path) -> String {
-        let baseline = ResultLine { method: "track".into(), ..ResultLine::example("<b>", "limo", "none", 1) };
+    /// Writes the report of `lines` and returns its page.
+    pub(super) fn evaluate(lines: &[ResultLine], out: &Path) -> String {
         let evaluation = Evaluation {
             lines: lines.iter().collect(),
-            baselines: vec![BaselineLine::from(&baseline)],
             command: "sharp eval \"quick\" --out <here>".into(),
             out,
         };
         let page = write(&evaluation).expect("a report");
         std::fs::read_to_string(page).expect("a page")
+    }
+
+    /// What a whole evaluation leaves, one line of each sort.
+    pub(super) fn whole() -> Vec<ResultLine> {
+        let line = ResultLine::example("a", "husky", "interface", 1);
+        let mut lines = lines();
+        lines.extend([
+            ResultLine { noise: "nominal*2".into(), ..line.clone() },
+            ResultLine { regions: "grid".into(), ..line.clone() },
+            ResultLine { env: "d".into(), ..line.clone() },
+            ResultLine { method: "track".into(), status: "driven".into(), ..line.clone() },
+            line,
+        ]);
+        lines
     }
 
     /// A solved problem, one that was never driven to its end, and one without a plan.
@@ -118,17 +154,44 @@ mod tests {
     #[test]
     fn the_page_has_every_figure_and_nothing_from_elsewhere() {
         let folder = tempfile::tempdir().expect("a folder");
-        let html = evaluate(&lines(), folder.path());
-        for name in ["time", "success", "calibration", "reuse", "driving"] {
+        let html = evaluate(&whole(), folder.path());
+        let report = folder.path().join("report");
+        let names = [
+            "time",
+            "success",
+            "phases",
+            "driving",
+            "calibration",
+            "noise",
+            "ablations",
+            "time-d",
+            "success-d",
+            "reuse",
+        ];
+        let markdown = std::fs::read_to_string(report.join("tables.md")).expect("tables");
+        for name in names {
             assert!(html.contains(&format!("<section id=\"{name}\">")), "no figure {name}");
+            assert!(markdown.contains(&format!("({name}.svg)")), "no table {name}");
             for ending in ["svg", "png"] {
-                let path = folder.path().join("report").join(format!("{name}.{ending}"));
+                let path = report.join(format!("{name}.{ending}"));
                 assert!(path.is_file(), "no {}", path.display());
             }
         }
+        assert!(report.join("ompl.log").is_file(), "no log for Planner Arena");
         for foreign in ["NaN", "inf<", "<script", "<link", "src=\"http", "url(http", "@import"] {
             assert!(!html.contains(foreign), "the page has {foreign}");
         }
+    }
+
+    #[test]
+    fn what_was_not_measured_is_left_out_with_its_command() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let html = evaluate(&lines(), folder.path());
+        for name in ["noise", "ablations", "time-d"] {
+            assert!(!html.contains(&format!("<section id=\"{name}\">")), "an empty figure {name}");
+        }
+        assert!(html.contains("--methods sharp --regions grid</code>"), "{html}");
+        assert!(!html.contains("Nothing to show"), "{html}");
     }
 
     #[test]

@@ -1,14 +1,38 @@
-//! The figure of reuse: how many of the options that plans used had been learnt before.
+//! The figure of reuse: how many of the options that plans used had been learnt before, beside the
+//! paper's own table (appendix C).
 
 use std::collections::BTreeMap;
 
-use super::figure::{Axis, Figure, INK, LEFT, Panel, RIGHT, Style, TEXT, TOP, Table, legend, percent};
+use super::figure::{
+    Axis, Figure, INK, LEFT, Panel, RIGHT, Style, TEXT, TOP, Table, legend, marker, percent,
+};
 use super::lines::ResultLine;
 use crate::render::Anchor;
 use crate::report::Reuse;
 
 const BAR: f64 = 15.0;
 const GAP: f64 = 5.0;
+
+/// Environment, centroid options, interface options: the paper's table, shares.
+const PAPER: [(&str, f64, f64); 7] = [
+    ("a", 0.50, 0.43),
+    ("b", 0.50, 0.33),
+    ("c", 0.33, 0.20),
+    ("d", 0.33, 0.33),
+    ("e", 0.39, 0.37),
+    ("f", 0.36, 0.33),
+    ("g", 0.50, 0.42),
+];
+
+/// What the paper reports of `options` in `env`.
+fn paper(env: &str, options: &str) -> Option<f64> {
+    let (_, centroid, interface) = PAPER.iter().find(|(name, ..)| *name == env)?;
+    match options {
+        "centroid" => Some(*centroid),
+        "interface" => Some(*interface),
+        _ => None,
+    }
+}
 
 /// Robot, environment, kind of option.
 type Group<'a> = (&'a str, &'a str, &'a str);
@@ -17,15 +41,17 @@ pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
     let sums: Vec<(Group<'_>, Reuse)> = sums(lines).into_iter().collect();
     Figure {
         name: "reuse",
-        title: "Reuse of options",
-        caption: "Option uses of all problems of an environment, and how many were reused. An option use is \
-                  reused if its policy existed before the problem began. The first problem of an \
-                  environment reuses nothing; legs from the start and to the goal are no options."
+        title: "Reuse of options (appendix C)",
+        caption: "Option uses of all problems of an environment, trials together, and how many were reused. An \
+                  option use is reused if its policy existed before the problem began. The first problem of an \
+                  environment reuses nothing; legs from the start and to the goal are no options. The paper's \
+                  table stands beside it: its maps and problems are others, it does not define its figure, and \
+                  it does not tell the robots apart."
             .to_owned(),
-        legend: legend(lines.iter().map(|line| line.options.as_str())),
+        legend: legend(lines.iter().map(|line| line.options.as_str()).chain(["paper"])),
         panels: sums.chunk_by(|a, b| a.0.0 == b.0.0).map(panel).collect(),
         table: Table {
-            columns: vec!["env", "robot", "options", "reused", "uses", "share"],
+            columns: vec!["env", "robot", "options", "reused", "uses", "share", "in the paper"],
             rows: sums.iter().map(row).collect(),
         },
     }
@@ -56,6 +82,7 @@ fn row(((robot, env, options), reuse): &(Group<'_>, Reuse)) -> Vec<String> {
         reuse.reused.to_string(),
         reuse.uses.to_string(),
         percent(share(reuse)),
+        paper(env, options).map_or_else(|| "-".to_owned(), percent),
     ]
 }
 
@@ -63,16 +90,19 @@ fn panel(groups: &[(Group<'_>, Reuse)]) -> Panel {
     let envs: Vec<_> = groups.chunk_by(|a, b| a.0.1 == b.0.1).collect();
     let bottom = TOP + GAP * envs.len() as f64 + BAR * groups.len() as f64;
     let mut panel = Panel::new(groups[0].0.0.to_owned(), bottom + 18.0);
-    let axis = Axis { low: 0.0, high: 1.0, ends: [LEFT, RIGHT] };
+    let axis = Axis::of_shares();
     axis.draw(&mut panel.chart, [TOP, bottom], percent);
     let mut top = TOP;
     for groups in envs {
         top += GAP;
         panel.chart.text([0.0, top + 11.0], Anchor::Start, TEXT, INK, groups[0].0.1);
-        for ((_, _, options), reuse) in groups {
+        for ((_, env, options), reuse) in groups {
             let (end, y, style) = (axis.at(share(reuse)), top + BAR / 2.0, Style::of(options));
             panel.chart.line([LEFT, y], [end, y], style.color, 4.0);
-            panel.chart.marker([end, y], style.shape, 4.5, style.color);
+            marker(&mut panel.chart, [end, y], &style, false);
+            if let Some(share) = paper(env, options) {
+                marker(&mut panel.chart, [axis.at(share), y], &Style::of("paper"), false);
+            }
             let number = format!("{}/{}", reuse.reused, reuse.uses);
             panel.chart.text([RIGHT + 8.0, top + 11.0], Anchor::Start, TEXT, INK, number);
             top += BAR;
@@ -94,6 +124,12 @@ mod tests {
         };
         let figure = figure(&[&lines[0], &lines[1], &other]);
         let rows: Vec<String> = figure.table.rows.iter().map(|row| row.join(" ")).collect();
-        assert_eq!(rows, ["a limo centroid 2 8 25 %", "b limo centroid 0 0 0 %"]);
+        assert_eq!(rows, ["a limo centroid 2 8 25 % 50 %", "b limo centroid 0 0 0 % 50 %"]);
+    }
+
+    #[test]
+    fn the_papers_table_names_what_it_holds_only() {
+        assert_eq!((paper("c", "interface"), paper("g", "centroid")), (Some(0.2), Some(0.5)));
+        assert_eq!((paper("h", "centroid"), paper("a", "other")), (None, None));
     }
 }

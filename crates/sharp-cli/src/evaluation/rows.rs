@@ -1,166 +1,159 @@
-//! Figures with one row a method under each problem: success with its interval, and driving time.
+//! Figures with one row a method under each problem: time until it can drive, success, driving time.
 
-use std::collections::BTreeSet;
-
-use sharp_plan::Tally;
-
+use super::cases::{Case, cases};
 use super::figure::{
-    Axis, Figure, INK, LEFT, Panel, RIGHT, Style, TEXT, TOP, Table, legend, percent, plain, seconds,
+    Axis, Figure, INK, Panel, RIGHT, Style, TEXT, TOP, Table, legend, marker, percent, plain, seconds,
 };
-use super::lines::{BaselineLine, ResultLine};
+use super::lines::ResultLine;
 use crate::render::Anchor;
 
 const ROW: f64 = 13.0;
 const GAP: f64 = 7.0;
+/// What is shorter is shown as long as this: whoever waits cannot tell.
+const SHORTEST_S: f64 = 0.01;
 
-/// What one method did on one problem.
-#[derive(Clone, Copy, Debug)]
-struct Row<'a> {
-    env: &'a str,
-    robot: &'a str,
-    problem: usize,
-    /// Kind of option, or name of the baseline.
-    method: &'a str,
-    tally: Tally,
-    /// Mean simulated time of successful executions.
-    sim_time_s: f64,
-}
-
-/// What a figure shows of a row.
+/// What a figure shows of a case.
 struct Shown {
     /// Both ends of the interval and what lies between; `None` if there is nothing to show.
-    values: fn(&Row<'_>) -> Option<[f64; 3]>,
+    values: fn(&Case<'_>) -> Option<[f64; 3]>,
     /// The number at the right.
-    number: fn(&Row<'_>) -> String,
-    /// The axis of a panel with these rows.
-    axis: fn(&[Row<'_>]) -> Axis,
+    number: fn(&Case<'_>) -> String,
+    /// The axis of a panel with these cases.
+    axis: fn(&[Case<'_>]) -> Axis,
     /// How the axis writes its values.
     tick: fn(f64) -> String,
+    /// Columns of the table behind those that name the case.
+    columns: &'static [Column],
 }
 
-/// Success of every problem with its interval.
-pub(super) fn success(lines: &[&ResultLine], baselines: &[BaselineLine]) -> Figure {
-    let rows = rows(lines, baselines);
+/// A column: its name, and what a case has in it.
+type Column = (&'static str, fn(&Case<'_>) -> String);
+
+/// Time until there is something to drive with: the paper's figure of times.
+pub(super) fn time(name: &'static str, title: &'static str, lines: &[&ResultLine]) -> Figure {
     let shown = Shown {
-        values: |row| Some([row.tally.lower95(), row.tally.rate(), row.tally.upper95()]),
-        number: |row| format!("{}/{}", row.tally.successes, row.tally.episodes),
-        axis: |_| Axis { low: 0.0, high: 1.0, ends: [LEFT, RIGHT] },
-        tick: percent,
+        values: |case| {
+            let time = case.ready_s;
+            Some([time.low, time.mean, time.high].map(|seconds| seconds.max(SHORTEST_S).log10()))
+        },
+        number: |case| seconds(case.ready_s.mean),
+        axis: |cases| {
+            let logs = || cases.iter().map(|case| case.ready_s.mean.max(SHORTEST_S).log10());
+            Axis::decades(logs().fold(0.0, f64::min), logs().fold(0.0, f64::max))
+        },
+        tick: |log| plain(10_f64.powf(log)),
+        columns: &[("time s", |case| case.ready_s.text(2))],
     };
-    Figure {
-        name: "success",
-        title: "Success of each problem",
-        caption: "Share of executions that reached the goal without touching a wall, with Wilson's 95 % \
-                  interval; a problem without a plan counts as failed. Only RRT with contact allowed may \
-                  touch walls, back off and go on."
-            .to_owned(),
-        legend: legend(rows.iter().map(|row| row.method)),
-        panels: panels(&rows, &shown),
-        table: table(&rows),
-    }
+    let caption = "Wall time until there is a policy or a path, seconds, on a logarithmic axis; over several \
+                   trials the mean with Student's 95 % interval. SHARP: everything that sharp solve does, \
+                   regions, abstraction, learning and verification; problems of one robot and kind share a \
+                   library and are solved in order. SAC: learning. RRT, tracking, MPPI: planning of one \
+                   execution. A hollow marker never reached the goal.";
+    figure((name, title), caption, lines, &shown)
+}
+
+/// Success of every problem with its interval: the paper's figure of success.
+pub(super) fn success(name: &'static str, title: &'static str, lines: &[&ResultLine]) -> Figure {
+    let shown = Shown {
+        values: |case| Some([case.tally.lower95(), case.tally.rate(), case.tally.upper95()]),
+        number: |case| format!("{}/{}", case.tally.successes, case.tally.episodes),
+        axis: |_| Axis::of_shares(),
+        tick: percent,
+        columns: &[
+            ("success", |case| format!("{}/{}", case.tally.successes, case.tally.episodes)),
+            ("95 % interval", |case| format!("{:.3}-{:.3}", case.tally.lower95(), case.tally.upper95())),
+        ],
+    };
+    let caption = "Share of executions, of all trials together, that reached the goal without touching a wall, \
+                   with Wilson's 95 % interval; a problem without a plan counts as failed. Only RRT with \
+                   contact allowed may touch walls, back off and go on.";
+    figure((name, title), caption, lines, &shown)
 }
 
 /// Driving time of every problem.
-pub(super) fn driving(lines: &[&ResultLine], baselines: &[BaselineLine]) -> Figure {
-    let rows = rows(lines, baselines);
+pub(super) fn driving(lines: &[&ResultLine]) -> Figure {
     let shown = Shown {
-        values: |row| (row.tally.successes > 0).then_some([row.sim_time_s; 3]),
-        number: |row| if row.tally.successes > 0 { seconds(row.sim_time_s) } else { "never".to_owned() },
-        axis: |rows| Axis::from_zero(rows.iter().map(|row| row.sim_time_s).fold(0.0, f64::max)),
+        values: |case| case.driving_s.map(|time| [time.low, time.mean, time.high]),
+        number: |case| case.driving_s.map_or_else(|| "never".to_owned(), |time| seconds(time.mean)),
+        axis: |cases| {
+            let times = cases.iter().filter_map(|case| case.driving_s);
+            Axis::from_zero(times.map(|time| time.mean).fold(0.0, f64::max))
+        },
         tick: plain,
+        columns: &[("driving s", |case| case.driving_s.map_or_else(|| "-".to_owned(), |time| time.text(1)))],
     };
+    let caption = "Mean simulated time of the executions that reached the goal, seconds; over several trials \
+                   with Student's 95 % interval. A method that fails on the long ways looks quicker than it \
+                   is: read it beside the success. Each panel has an axis of its own.";
+    figure(("driving", "Driving time of each problem"), caption, lines, &shown)
+}
+
+fn figure(
+    (name, title): (&'static str, &'static str),
+    caption: &str,
+    lines: &[&ResultLine],
+    shown: &Shown,
+) -> Figure {
+    let cases = cases(lines);
+    let same = |a: &Case<'_>, b: &Case<'_>| (a.env, a.robot) == (b.env, b.robot);
     Figure {
-        name: "driving",
-        title: "Driving time of each problem",
-        caption: "Mean simulated time of the executions that reached the goal, seconds. A method that \
-                  fails on the long ways looks quicker than it is: read it beside the success. Each panel has an axis of its own."
-            .to_owned(),
-        legend: legend(rows.iter().map(|row| row.method)),
-        panels: panels(&rows, &shown),
-        table: table(&rows),
+        name,
+        title,
+        caption: caption.to_owned(),
+        legend: legend(cases.iter().map(|case| case.method)),
+        panels: cases.chunk_by(same).map(|cases| panel(cases, shown)).collect(),
+        table: table(&cases, shown.columns),
     }
 }
 
-/// SHARP's lines, then the baselines' lines for the same problems.
-fn rows<'a>(lines: &[&'a ResultLine], baselines: &'a [BaselineLine]) -> Vec<Row<'a>> {
-    let problems: BTreeSet<_> = lines.iter().map(|line| (&*line.env, &*line.robot, line.problem)).collect();
-    let mut rows: Vec<Row<'a>> = lines
-        .iter()
-        .map(|line| Row {
-            env: &line.env,
-            robot: &line.robot,
-            problem: line.problem,
-            method: &line.options,
-            tally: line.tally(),
-            sim_time_s: line.mean_sim_time_s,
-        })
-        .collect();
-    let shared = baselines.iter().filter(|line| problems.contains(&(&*line.env, &*line.robot, line.problem)));
-    rows.extend(shared.map(|line| Row {
-        env: &line.env,
-        robot: &line.robot,
-        problem: line.problem,
-        method: &line.method,
-        tally: Tally { episodes: line.report.episodes, successes: line.report.successes },
-        sim_time_s: line.report.mean_sim_time_s,
-    }));
-    rows.sort_by_key(|row| (row.env, row.robot, row.problem, Style::rank(row.method), row.method));
-    rows
-}
-
-fn panels(rows: &[Row<'_>], shown: &Shown) -> Vec<Panel> {
-    let same = |a: &Row<'_>, b: &Row<'_>| (a.env, a.robot) == (b.env, b.robot);
-    rows.chunk_by(same).map(|rows| panel(rows, shown)).collect()
-}
-
-fn panel(rows: &[Row<'_>], shown: &Shown) -> Panel {
-    let problems: Vec<&[Row<'_>]> = rows.chunk_by(|a, b| a.problem == b.problem).collect();
-    let bottom = TOP + GAP * problems.len() as f64 + ROW * rows.len() as f64;
-    let title = format!("environment {}, {}", rows[0].env, rows[0].robot);
+fn panel(cases: &[Case<'_>], shown: &Shown) -> Panel {
+    let problems: Vec<&[Case<'_>]> = cases.chunk_by(|a, b| a.problem == b.problem).collect();
+    let bottom = TOP + GAP * problems.len() as f64 + ROW * cases.len() as f64;
+    let title = format!("environment {}, {}", cases[0].env, cases[0].robot);
     let mut panel = Panel::new(title, bottom + 18.0);
-    let axis = (shown.axis)(rows);
+    let axis = (shown.axis)(cases);
     axis.draw(&mut panel.chart, [TOP, bottom], shown.tick);
     let mut top = TOP;
-    for rows in problems {
+    for cases in problems {
         top += GAP;
-        let label = format!("P{}", rows[0].problem);
+        let label = format!("P{}", cases[0].problem);
         panel.chart.text([0.0, top + 10.0], Anchor::Start, TEXT, INK, label);
-        for row in rows {
-            mark(&mut panel, row, shown, &axis, top + ROW / 2.0);
+        for case in cases {
+            mark(&mut panel, case, shown, &axis, top + ROW / 2.0);
             top += ROW;
         }
     }
     panel
 }
 
-fn mark(panel: &mut Panel, row: &Row<'_>, shown: &Shown, axis: &Axis, y: f64) {
-    let style = Style::of(row.method);
-    if let Some([low, value, high]) = (shown.values)(row) {
+fn mark(panel: &mut Panel, case: &Case<'_>, shown: &Shown, axis: &Axis, y: f64) {
+    let style = Style::of(case.method);
+    if let Some([low, value, high]) = (shown.values)(case) {
         panel.chart.line([axis.at(low), y], [axis.at(high), y], style.color, 2.0);
-        panel.chart.marker([axis.at(value), y], style.shape, 3.6, style.color);
+        marker(&mut panel.chart, [axis.at(value), y], &style, case.tally.successes == 0);
     }
-    panel.chart.text([RIGHT + 8.0, y + 4.0], Anchor::Start, TEXT, INK, (shown.number)(row));
+    panel.chart.text([RIGHT + 8.0, y + 4.0], Anchor::Start, TEXT, INK, (shown.number)(case));
 }
 
-fn table(rows: &[Row<'_>]) -> Table {
-    let columns = vec!["env", "robot", "problem", "method", "success", "95 % interval", "driving s"];
-    let row = |row: &Row<'_>| {
-        let driving = if row.tally.successes > 0 { format!("{:.1}", row.sim_time_s) } else { "-".into() };
-        vec![
-            row.env.to_owned(),
-            row.robot.to_owned(),
-            format!("P{}", row.problem),
-            method(row.method),
-            format!("{}/{}", row.tally.successes, row.tally.episodes),
-            format!("{:.3}-{:.3}", row.tally.lower95(), row.tally.upper95()),
-            driving,
-        ]
+fn table(cases: &[Case<'_>], more: &[Column]) -> Table {
+    let mut columns = vec!["env", "robot", "problem", "method", "trials"];
+    columns.extend(more.iter().map(|(name, _)| name));
+    let row = |case: &Case<'_>| {
+        let mut row = vec![
+            case.env.to_owned(),
+            case.robot.to_owned(),
+            format!("P{}", case.problem),
+            label(case.method),
+            case.trials.to_string(),
+        ];
+        row.extend(more.iter().map(|(_, of)| of(case)));
+        row
     };
-    Table { columns, rows: rows.iter().map(row).collect() }
+    Table { columns, rows: cases.iter().map(row).collect() }
 }
 
 /// The label of a method; one without a style keeps its name.
-fn method(name: &str) -> String {
+pub(super) fn label(name: &str) -> String {
     match Style::of(name).label {
         "other" => name.to_owned(),
         label => label.to_owned(),
@@ -170,36 +163,50 @@ fn method(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::lines::BaselineCounts;
+    use crate::render::Lettering;
+    use crate::report::SolveTimes;
 
-    fn baseline(env: &str, successes: u32) -> BaselineLine {
-        BaselineLine {
-            method: "rrt".into(),
-            noise: "nominal".into(),
-            env: env.into(),
-            robot: "limo".into(),
-            problem: 1,
-            report: BaselineCounts { episodes: 20, successes, mean_sim_time_s: 12.5 },
-        }
+    fn baseline(successes: u32) -> ResultLine {
+        let line = ResultLine::example("a", "limo", "none", 1);
+        let mean_sim_time_s = if successes == 0 { 0.0 } else { 12.5 };
+        ResultLine { method: "rrt".into(), successes, mean_sim_time_s, ..line }
     }
 
     #[test]
-    fn baselines_stand_beside_the_same_problem_only() {
+    fn methods_stand_side_by_side() {
         let line = ResultLine::example("a", "limo", "interface", 1);
-        let figure = success(&[&line], &[baseline("a", 5), baseline("b", 6)]);
+        let figure = success("success", "Success", &[&line, &baseline(5)]);
         let rows: Vec<String> = figure.table.rows.iter().map(|row| row.join(" ")).collect();
         assert_eq!(
             rows,
-            ["a limo P1 SHARP interface 20/20 0.839-1.000 25.0", "a limo P1 RRT 5/20 0.112-0.469 12.5"]
+            ["a limo P1 SHARP interface 1 20/20 0.839-1.000", "a limo P1 RRT 1 5/20 0.112-0.469"]
         );
-        assert_eq!(figure.panels.len(), 1, "environment b has no result of SHARP");
+        assert_eq!(figure.panels.len(), 1, "one environment, one robot");
     }
 
     #[test]
-    fn who_never_arrived_has_no_driving_time() {
-        let line = ResultLine::example("a", "limo", "interface", 1);
-        let figure = driving(&[&line], &[baseline("a", 0)]);
-        let svg = figure.to_svg();
+    fn who_never_arrived_has_no_driving_time_and_a_hollow_marker() {
+        let svg = driving(&[&baseline(0)]).to_svg();
         assert!(svg.contains(">never</text>") && !svg.contains(">12.5 s</text>"), "{svg}");
+        let hollow = |successes| {
+            time("time", "Time", &[&baseline(successes)]).panels[0]
+                .chart
+                .to_svg("", Lettering::Text)
+                .matches("#fff")
+                .count()
+        };
+        assert_eq!(hollow(0), hollow(1) + 1, "a white heart");
+    }
+
+    #[test]
+    fn times_of_all_sizes_fit_on_one_axis() {
+        let mut slow = ResultLine::example("a", "limo", "centroid", 1);
+        slow.time_s.total = 2400.0;
+        let quick =
+            ResultLine { time_s: SolveTimes::default(), ..ResultLine::example("a", "limo", "interface", 1) };
+        let svg = time("time", "Time", &[&slow, &quick]).to_svg();
+        for tick in [">0.01<", ">1<", ">10000<", ">2400 s<", ">0.00 s<"] {
+            assert!(svg.contains(tick), "no {tick} in {svg}");
+        }
     }
 }

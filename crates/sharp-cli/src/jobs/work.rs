@@ -159,10 +159,12 @@ fn solve_args(spec: &Spec, sharp: &SharpSpec, problem: usize, [library, out]: [P
         problem: Some(problem),
         learning: sharp.learning,
         noise: spec.noise.clone(),
+        cost_update: sharp.cost_update,
         guide: Guide::Ridge,
         library: Some(library.display().to_string()),
         out: Some(out),
         time_limit: Some(spec.time_limit_s),
+        tensorboard: None,
     }
 }
 
@@ -225,6 +227,7 @@ fn baseline_args(spec: &Spec, problem: usize) -> Baseline {
         time_limit: Some(spec.time_limit_s),
         rrt_samples: 30_000,
         max_env_steps: 1_000_000,
+        tensorboard: None,
     }
 }
 

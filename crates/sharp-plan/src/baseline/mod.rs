@@ -5,7 +5,6 @@
 //! time limit: three times what its own first path takes at half the robot's top speed, and at least
 //! a minute. [`Rrt`] and [`Sac`] are the paper's; [`Track`] and [`Mppi`] are what an engineer would use.
 
-mod model;
 mod mppi;
 mod observer;
 mod route;
@@ -26,7 +25,7 @@ pub use mppi::{Mppi, MppiSettings};
 pub use route::RoutePlanner;
 pub use rrt::Rrt;
 pub use sac::{Sac, SacBudget};
-pub use track::{SpeedRule, Track, TrackSettings};
+pub use track::Track;
 
 use crate::composed::Events;
 use crate::execute::{Episode, EpisodeEnd};

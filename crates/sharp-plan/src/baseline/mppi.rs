@@ -12,11 +12,12 @@ use sharp_guide::GuidePath;
 use sharp_sim::{ActionSettings, NoiseModel, RobotModel, RobotState};
 use sharp_space::{CollisionChecker, Pose, Seed, Stream};
 
-use crate::baseline::model::{MODEL_DT_S, Model};
-use crate::baseline::observer::{Observer, Trim};
+use crate::baseline::observer::Observer;
 use crate::baseline::route::{OnRoute, RoutePlanner};
-use crate::baseline::track::TrackSettings;
 use crate::baseline::{Baseline, Pilot, Readiness, Situation};
+use crate::belief::Trim;
+use crate::model::MODEL_DT_S;
+use crate::pace::PacedFollower;
 use crate::percept::{Tracker, Workspace};
 use crate::planner::Query;
 use crate::policy::PolarWaypoint;
@@ -43,7 +44,7 @@ pub struct MppiSettings {
     /// Cost of a contact.
     pub contact_cost: f64,
     /// What the perturbations are added to.
-    pub base: TrackSettings,
+    pub base: PacedFollower,
 }
 
 impl MppiSettings {
@@ -60,7 +61,7 @@ impl MppiSettings {
             room_weight: 4.0,
             cross_weight: 2.0,
             contact_cost: 100.0,
-            base: TrackSettings::new(robot, noise),
+            base: PacedFollower::tuned(robot, noise),
         }
     }
 }
@@ -87,13 +88,11 @@ pub struct Mppi<'a> {
 impl Baseline for Mppi<'_> {
     fn pilot(&self, episode: u64) -> Box<dyn Pilot + '_> {
         let Self { workspace, planner, query, route, settings, noise, seed } = self;
-        let model = Model::new(&workspace.robot);
         Box::new(MppiPilot {
             workspace,
             settings,
             on_route: OnRoute::new(planner, *query, route.clone(), settings.base.speed),
-            observer: Observer::new(model.clone(), noise),
-            model,
+            observer: Observer::new(workspace, noise),
             // The last disc ends at the nose, so a corner is a half width ahead of and beside its centre.
             corner_m: (std::f64::consts::SQRT_2 - 1.0) * workspace.robot.footprint.half_width_m(),
             mean: vec![Push::default(); settings.horizon],
@@ -126,7 +125,6 @@ struct MppiPilot<'a> {
     workspace: &'a Workspace,
     settings: &'a MppiSettings,
     on_route: OnRoute<'a>,
-    model: Model,
     observer: Observer,
     /// How far the outline's corners stick out of the discs beside which room is measured, metres.
     corner_m: f64,
@@ -151,7 +149,7 @@ impl Pilot for MppiPilot<'_> {
         self.decisions += 1;
         let samples = self.samples(&mut rng);
         let (robot, on_route) = (&self.workspace.robot, &self.on_route);
-        let base = self.settings.base.waypoint(robot, &state.pose, &on_route.tracker, on_route);
+        let base = self.settings.base.along(robot, &state.pose, &on_route.tracker, on_route.paced());
         let trim = self.observer.trim(base, self.settings.base.trim);
         let costs: Vec<f64> =
             samples.chunks(self.settings.horizon).map(|pushes| self.cost(state, pushes, &trim)).collect();
@@ -189,9 +187,9 @@ impl MppiPilot<'_> {
         let (mut state, mut tracker) = (*state, on_route.tracker);
         let (begun_m, mut cost) = (tracker.arc_m, 0.0);
         for (number, push) in pushes.iter().enumerate() {
-            let base = settings.base.waypoint(robot, &state.pose, &tracker, on_route);
+            let base = settings.base.along(robot, &state.pose, &tracker, on_route.paced());
             let command = push.applied(robot, trim.applied(base));
-            if !self.model.act(&mut state, command, traits, |at| self.is_free(at, &mut cost)) {
+            if !workspace.model.act(&mut state, command, traits, |at| self.is_free(at, &mut cost)) {
                 // The later, the less certain.
                 return cost + settings.contact_cost / (1.0 + number as f64);
             }

@@ -8,8 +8,8 @@ use sharp_motion::{Budget, HybridSettings, Path, RrtSettings, Steering, hybrid_a
 use sharp_sim::RobotState;
 use sharp_space::{CollisionChecker, Footprint, FootprintChecker, Heading, Point, Pose, Seed};
 
-use crate::baseline::track::SpeedRule;
 use crate::baseline::{Readiness, Situation, nominal_time_s};
+use crate::pace::SpeedRule;
 use crate::percept::{Tracker, Workspace};
 use crate::planner::Query;
 
@@ -125,7 +125,7 @@ pub(crate) struct OnRoute<'a> {
     pub(crate) route: GuidePath,
     speed: SpeedRule,
     /// How freely the robot may drive along the route.
-    pub(crate) ease: Vec<f64>,
+    ease: Vec<f64>,
     pub(crate) tracker: Tracker,
     /// Where the robot last moved, and the actions since.
     anchor: (Pose, u32),
@@ -141,8 +141,13 @@ impl<'a> OnRoute<'a> {
         speed: SpeedRule,
     ) -> Self {
         let tracker = Tracker::start(&route, &query.start);
-        let ease = speed.ease(planner.workspace, &route);
+        let ease = speed.along(planner.workspace, &route);
         Self { planner, query, route, speed, ease, tracker, anchor: (query.start, 0), actions: None }
+    }
+
+    /// The route, and how freely the robot may drive along it.
+    pub(crate) fn paced(&self) -> (&GuidePath, &[f64]) {
+        (&self.route, &self.ease)
     }
 
     /// Projects the robot onto its route; a new one is planned from where it is if it has left it.
@@ -164,7 +169,7 @@ impl<'a> OnRoute<'a> {
         let query = Query { start: state.pose, ..self.query };
         match self.planner.plan(&query) {
             Some(route) => {
-                self.ease = self.speed.ease(self.planner.workspace, &route);
+                self.ease = self.speed.along(self.planner.workspace, &route);
                 self.route = route;
                 self.tracker = Tracker::start(&self.route, &state.pose);
                 (self.anchor, self.actions) = ((state.pose, 0), Some(0));

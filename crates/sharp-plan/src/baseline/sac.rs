@@ -4,11 +4,9 @@
 //! point. The goal is worth 1000, a step costs 1. While it learns a wall blocks it and the episode
 //! goes on: were contact the end, an early end would be the cheapest way to fail.
 
-use std::ops::ControlFlow;
-
 use rand::RngExt;
 use sharp_rl::{
-    Actor, ActorScratch, Environment, EnvironmentSpec, Progress, Step, StopRule, TrainError, TrainSettings,
+    Actor, ActorScratch, Environment, EnvironmentSpec, Observer, Step, StopRule, TrainError, TrainSettings,
     train,
 };
 use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, RobotModel, RobotState, Vehicle};
@@ -47,8 +45,8 @@ pub struct Sac<'a> {
 }
 
 impl<'a> Sac<'a> {
-    /// Learns until 20 episodes return 500 on average, the budget is used up, or `stop` says so; then
-    /// the best policy so far is kept.
+    /// Learns until 20 episodes return 500 on average, the budget is used up, or `observer` breaks off;
+    /// then the best policy so far is kept.
     ///
     /// # Errors
     /// If anything in the task stops being finite.
@@ -57,7 +55,7 @@ impl<'a> Sac<'a> {
         query: Query,
         (noise, seed): (&NoiseModel, Seed),
         budget: SacBudget,
-        stop: &(dyn Fn() -> bool + Sync),
+        observer: &mut Observer<'_>,
     ) -> Result<Self, TrainError> {
         let mut task = [FlatTask::new(workspace, query, (noise, seed), budget.horizon_s)];
         let settings = TrainSettings {
@@ -65,9 +63,7 @@ impl<'a> Sac<'a> {
             stop: StopRule::MeanReturn(500.0),
             ..TrainSettings::default()
         };
-        let mut observer =
-            |_: &Progress<'_>| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        let trained = train(&mut task, &settings, &mut seed.stream("sac", 0), &mut observer)?;
+        let trained = train(&mut task, &settings, &mut seed.stream("sac", 0), observer)?;
         let (env_steps, updates) = (trained.env_steps, trained.updates);
         Ok(Self { workspace, query, budget, actor: trained.actor, env_steps, updates })
     }

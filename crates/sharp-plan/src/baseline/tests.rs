@@ -7,6 +7,7 @@ use sharp_space::{OccupancyGrid, Pose, Seed};
 
 use super::*;
 use crate::drawn::{HALL, RING, SEALED};
+use crate::pace::PacedFollower;
 
 const SILENT: Host<'static> = Host { clock_us: &|| 0.0, stop: &|| false };
 
@@ -44,7 +45,7 @@ fn each_drives(
         planner: &planner,
         query,
         route: route.clone(),
-        settings: TrackSettings::new(robot, noise),
+        settings: PacedFollower::tuned(robot, noise),
         noise: noise.clone(),
     };
     let mppi = Mppi {
@@ -170,7 +171,7 @@ fn whoever_leaves_the_route_gets_a_new_one() {
     let workspace = workspace(HALL, RobotModel::husky());
     let query = query((1.0, 2.2), (9.0, 2.2));
     let planner = RoutePlanner::new(&workspace);
-    let (settings, noise) = (TrackSettings::new(&workspace.robot, &NoiseModel::none()), NoiseModel::none());
+    let (settings, noise) = (PacedFollower::tuned(&workspace.robot, &NoiseModel::none()), NoiseModel::none());
     let route = planner.plan(&query).expect("a hall");
     let track = Track { workspace: &workspace, planner: &planner, query, route, settings, noise };
     let mut pilot = track.pilot(0);

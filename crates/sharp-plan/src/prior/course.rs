@@ -142,7 +142,7 @@ impl CourseTask {
         let state = starts[leg].draw(rng);
         let mut vehicle = crate::learn::kinematic_vehicle(workspace, &noise, true);
         vehicle.reset(state, self.seed, rng.random());
-        let percept = Percept::first(state);
+        let percept = Percept::first(state, &noise);
         let tracker = Tracker::start(&legs[leg].guide, &state.pose);
         Episode { course, leg, last, form, reward, vehicle, percept, tracker, actions: 0 }
     }
@@ -164,7 +164,7 @@ impl Episode {
         let view = self.view(legs);
         let command = self.form.waypoint(&course.workspace.robot, &pose, &self.tracker, &view, action);
         let report = self.vehicle.act_at(command.to_world(&pose), command.speed_mps);
-        self.percept = self.percept.next(command, report.after);
+        self.percept = self.percept.next(&course.workspace, command, report.after);
         let (before, pose) = (self.tracker, self.percept.state.pose);
         self.tracker.update(&legs[self.leg].guide, &pose);
         self.actions += 1;

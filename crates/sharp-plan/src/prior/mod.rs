@@ -18,7 +18,9 @@ use crate::policy::{Correction, Follower, Form, OptionPolicy, Rule};
 pub use course::{Course, CourseTask, courses};
 
 /// Degrees of caution at which the prior is offered, the least first.
-const CAUTIONS: [f32; 3] = [0.0, 0.5, 1.0];
+const CAUTIONS: [f32; 3] = [0.0, CAUTION, 1.0];
+/// The degree of caution of a prior that is taken without a choice.
+const CAUTION: f32 = 0.5;
 
 /// A learnt policy for every option of a kind of robot.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,12 +71,18 @@ impl Prior {
     /// Its policies for `robot` under `noise`, the least cautious first.
     #[must_use]
     pub fn candidates(&self, robot: &RobotModel, noise: &NoiseModel) -> Vec<OptionPolicy> {
-        let actor = &self.sac.actor;
-        let policy = |caution| OptionPolicy::Learnt {
-            form: form(robot, Expectation::new(noise, caution)),
-            actor: Box::new(actor.clone()),
-        };
-        CAUTIONS.into_iter().map(policy).collect()
+        CAUTIONS.into_iter().map(|caution| self.at(caution, robot, noise)).collect()
+    }
+
+    /// Its policy for `robot` under `noise` at middle caution.
+    #[must_use]
+    pub fn policy(&self, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
+        self.at(CAUTION, robot, noise)
+    }
+
+    fn at(&self, caution: f32, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
+        let form = form(robot, Expectation::new(noise, caution));
+        OptionPolicy::Learnt { form, actor: Box::new(self.sac.actor.clone()) }
     }
 }
 

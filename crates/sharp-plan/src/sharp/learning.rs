@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use sharp_sim::RobotState;
 
-use super::Run;
+use super::{LegMonitor, Run};
 use crate::certify::Trial;
 use crate::files::FileError;
 use crate::learn::{LearnFailure, LearningMode, Learnt, Lesson};
@@ -29,8 +29,8 @@ impl Run<'_> {
         let missing: Vec<Arc<Leg>> = legs.iter().filter(is_missing).cloned().collect();
         self.monitor.phase(Phase::Learn(missing.len()));
         match self.settings.learn.mode {
-            LearningMode::Fast if missing.is_empty() => Ok(true),
-            LearningMode::Fast => self.learn_in_order(legs),
+            LearningMode::Fast | LearningMode::Prior if missing.is_empty() => Ok(true),
+            LearningMode::Fast | LearningMode::Prior => self.learn_in_order(legs),
             LearningMode::Paper => self.learn_apart(&missing),
         }
     }
@@ -43,7 +43,7 @@ impl Run<'_> {
             if !self.learnt.contains_key(&leg.id) {
                 let starts = self.starts(leg, seed).with_arrivals(arrivals.clone());
                 let lesson = Lesson { next: legs.get(index + 1), ..self.lesson(leg, starts, seed) };
-                let result = lesson.learn(&|| self.monitor.should_stop());
+                let result = lesson.learn(&LegMonitor { monitor: self.monitor, leg });
                 if !self.take(leg, result)? {
                     return Ok(false);
                 }
@@ -60,7 +60,7 @@ impl Run<'_> {
     fn learn_apart(&mut self, missing: &[Arc<Leg>]) -> Result<bool, FileError> {
         let learn = |leg: &Arc<Leg>| {
             let seed = self.settings.seed.child(&format!("leg {}", leg.id), 0);
-            self.lesson(leg, self.starts(leg, seed), seed).learn(&|| self.monitor.should_stop())
+            self.lesson(leg, self.starts(leg, seed), seed).learn(&LegMonitor { monitor: self.monitor, leg })
         };
         let results: Vec<_> = missing.par_iter().map(learn).collect();
         let mut finished = true;

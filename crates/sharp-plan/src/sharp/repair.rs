@@ -5,11 +5,15 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use sharp_sim::RobotState;
 
-use super::{Run, tallies};
+use super::{LegMonitor, Run, certificate, tallies};
+use crate::certify::Certificate;
 use crate::files::FileError;
 use crate::learn::{LearnSettings, Learnt, Lesson};
 use crate::leg::Leg;
-use crate::rollout::{ChainRun, LegOutcome};
+use crate::pace::PacedFollower;
+use crate::policy::OptionPolicy;
+use crate::prior::Prior;
+use crate::rollout::ChainRun;
 use crate::stats::Tally;
 
 /// A leg that holds as often as this on arrival is not trained anew, only chosen anew.
@@ -20,24 +24,91 @@ const TAIL_LEGS: usize = 2;
 const GAIN_MIN: f64 = 0.003;
 
 impl Run<'_> {
-    /// Runs the plan and trains the weak legs on the states in which they were really entered.
-    /// Returns false if the plan holds as often as wanted, or no leg became better.
-    pub(super) fn repair(&mut self, legs: &[Arc<Leg>], round: u64) -> Result<bool, FileError> {
-        let runs = self.run_chain(legs, self.settings.repair_episodes, "repair", round);
-        let wanted = self.settings.wanted_success;
-        if Tally::count(runs.iter().map(|run| run.outcome == LegOutcome::Done)).rate() >= wanted {
-            return Ok(false);
+    /// Makes the plan of `legs` hold more often until it holds as wanted or nothing helps; every change
+    /// is tried on the same runs, and taken back if they say so. Returns false if stopped.
+    pub(super) fn repair(&mut self, legs: &[Arc<Leg>]) -> Result<bool, FileError> {
+        let mut runs = self.run_plan(legs);
+        for round in 0..self.settings.repair_rounds {
+            if self.monitor.should_stop() {
+                return Ok(false);
+            }
+            if certificate(&runs).tally.rate() >= self.settings.wanted_success {
+                break;
+            }
+            let before: Vec<Learnt> = legs.iter().map(|leg| self.learnt[&leg.id].clone()).collect();
+            let changed = (round == 0 && self.try_rivals(legs, &runs)?)
+                || self.relearn_weak(legs, &runs, u64::from(round))?;
+            if !changed {
+                break;
+            }
+            let anew = self.run_plan(legs);
+            if certificate(&anew).cost_s() >= certificate(&runs).cost_s() {
+                for (leg, learnt) in legs.iter().zip(before) {
+                    self.keep(leg, learnt)?;
+                }
+                break;
+            }
+            runs = anew;
         }
+        Ok(true)
+    }
+
+    /// The runs that repairs are judged by: always the same episodes.
+    fn run_plan(&self, legs: &[Arc<Leg>]) -> Vec<ChainRun> {
+        self.run_chain(&self.drivers(legs), self.settings.repair_episodes, "repair", 0)
+    }
+
+    /// Gives all legs that were learnt in this problem one and the same policy if the plan is better off:
+    /// each may have been chosen well for itself and badly for the next. Returns true if it is.
+    fn try_rivals(&mut self, legs: &[Arc<Leg>], runs: &[ChainRun]) -> Result<bool, FileError> {
+        let (robot, noise) = (&self.workspace.robot, &self.settings.noise);
+        let is_new: Vec<bool> = legs.iter().map(|leg| !self.before.contains(&leg.id)).collect();
+        let mut best = (certificate(runs).cost_s(), None);
+        let mut rivals = Prior::shipped(robot).candidates(robot, noise);
+        rivals.push(OptionPolicy::Paced(PacedFollower::tuned(robot, noise)));
+        for rival in rivals {
+            let mut drivers = self.drivers(legs);
+            for (driver, _) in drivers.iter_mut().zip(&is_new).filter(|(_, is_new)| **is_new) {
+                driver.policy = &rival;
+            }
+            let driven = self.run_chain(&drivers, self.settings.repair_episodes, "repair", 0);
+            let cost_s = certificate(&driven).cost_s();
+            if cost_s < best.0 {
+                best = (cost_s, Some((rival, driven)));
+            }
+        }
+        let Some((rival, driven)) = best.1 else { return Ok(false) };
+        let certify = |index: usize| {
+            let seed = self.settings.seed.child(&format!("rival {}", legs[index].id), 0);
+            let starts = self.starts(&legs[index], seed).with_arrivals(arrivals(&driven, index));
+            let lesson = self.lesson(&legs[index], starts, seed);
+            let Certificate { tally, mean_time_s } =
+                Lesson { next: legs.get(index + 1), ..lesson }.certify(&rival);
+            let Learnt { env_steps, gradient_steps, .. } = self.learnt[&legs[index].id];
+            Learnt { policy: rival.clone(), verified: tally, mean_time_s, env_steps, gradient_steps }
+        };
+        let new: Vec<usize> = (0..legs.len()).filter(|&index| is_new[index]).collect();
+        let learnt: Vec<Learnt> = new.par_iter().map(|&index| certify(index)).collect();
+        for (index, learnt) in new.into_iter().zip(learnt) {
+            self.monitor.learnt(&legs[index], &learnt);
+            self.keep(&legs[index], learnt)?;
+        }
+        Ok(true)
+    }
+
+    /// Trains the weak legs on the states in which they were entered in `runs`. Returns false if no leg
+    /// became better.
+    fn relearn_weak(&mut self, legs: &[Arc<Leg>], runs: &[ChainRun], round: u64) -> Result<bool, FileError> {
         // n legs that each fail at most a share (1 - wanted) / n make a plan that holds as wanted.
-        let leg_wanted = 1.0 - (1.0 - wanted) / legs.len() as f64;
+        let leg_wanted = 1.0 - (1.0 - self.settings.wanted_success) / legs.len() as f64;
         let is_weak = |tally: &Tally| tally.episodes >= 50 && tally.rate() < leg_wanted;
-        let on_arrival = tallies(&runs, legs.len());
+        let on_arrival = tallies(runs, legs.len());
         // Who arrives badly is as much to blame as who cannot cope with it.
         let is_to_blame =
             |index: usize| is_weak(&on_arrival[index]) || on_arrival.get(index + 1).is_some_and(is_weak);
         let weak: Vec<usize> = (0..legs.len()).filter(|&index| is_to_blame(index)).collect();
         let relearn =
-            |&index: &usize| self.relearn(legs, (index, on_arrival[index]), &runs, (leg_wanted, round));
+            |&index: &usize| self.relearn(legs, (index, on_arrival[index]), runs, (leg_wanted, round));
         let results: Vec<_> = weak.par_iter().map(relearn).collect();
         let mut better = false;
         for (index, learnt) in weak.into_iter().zip(results) {
@@ -60,10 +131,8 @@ impl Run<'_> {
         (wanted, round): (f64, u64),
     ) -> Option<Learnt> {
         let leg = &legs[index];
-        let arrivals: Vec<RobotState> =
-            runs.iter().filter_map(|run| run.entries.get(index).copied()).collect();
         let seed = self.settings.seed.child(&format!("repair {}", leg.id), round);
-        let starts = self.starts(leg, seed).with_arrivals(arrivals);
+        let starts = self.starts(leg, seed).with_arrivals(arrivals(runs, index));
         let mut settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
         // Training is for legs that are weak themselves, and once only.
         if self.learnt[&leg.id].gradient_steps > 0 || on_arrival.rate() >= TRAIN_BELOW {
@@ -75,9 +144,14 @@ impl Run<'_> {
         let lesson = Lesson { settings: &settings, next, tail, ..self.lesson(leg, starts, seed) };
         let old = &self.learnt[&leg.id];
         let present = lesson.judge(&old.policy);
-        let (judged, mut new) = lesson.learn_judged(&|| self.monitor.should_stop()).ok()?;
+        let (judged, mut new) = lesson.learn_judged(&LegMonitor { monitor: self.monitor, leg }).ok()?;
         new.env_steps += old.env_steps;
         new.gradient_steps += old.gradient_steps;
         (judged.tally.rate() - present.tally.rate() >= GAIN_MIN).then_some(new)
     }
+}
+
+/// The states in which leg number `index` was entered.
+fn arrivals(runs: &[ChainRun], index: usize) -> Vec<RobotState> {
+    runs.iter().filter_map(|run| run.entries.get(index).copied()).collect()
 }

@@ -1,4 +1,4 @@
-//! The robot as baselines imagine it: its waypoint controller on a body that follows its wheels.
+//! The robot as policies imagine it: its waypoint controller on a body that follows its wheels.
 //!
 //! No friction and no walls, a time step of two control periods, and the [`Traits`] of the robot at
 //! hand in place of noise.

@@ -1,0 +1,251 @@
+//! Our side of `cargo xtask bench peers option`: the longest option of a saved plan, learnt in several
+//! ways.
+//!
+//! `peer_option MAP PLAN paper SEED LIMIT` learns it by the paper's protocol, `scratch` in the guide's
+//! frame from fresh networks, both for at most `LIMIT` seconds; `fast SEED` does what the default mode
+//! does. Each prints one JSON object. `serve SEED` is the task that `paper` learns, for another
+//! program: see [`serve`]. Whoever learns is judged by the same rule, see [`judge`].
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "an example is a command: it reads its arguments and the clock"
+)]
+
+use std::io::{Read, Write};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+use sharp_guide::{PseudoReward, ShapedReward};
+use sharp_plan::{
+    Expectation, Form, LearnSettings, LearningMode, Leg, LegTask, Lesson, Plan, RewardMode, Role,
+    StartSpread, Starts, prior,
+};
+use sharp_rl::{
+    Actor, Environment, Evaluation, SacSettings, StopRule, Stream, TrainError, TrainSettings, evaluate, train,
+};
+use sharp_space::Seed;
+
+/// Success that counts as learnt, share of episodes.
+const WANTED: f64 = 0.95;
+/// Environment steps between two looks at the success.
+const JUDGE_EVERY: u64 = 1_000;
+/// Episodes of a look, and further ones where these suffice.
+const EPISODES: [usize; 2] = [20, 200];
+/// States to begin in: as many as the planner draws.
+const STARTS: usize = 256;
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> Outcome<()> {
+    let usage = "usage: peer_option MAP PLAN paper|scratch SEED LIMIT | fast SEED | serve SEED";
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [map, plan, rest @ ..] = &arguments[..] else { return Err(usage.into()) };
+    let grid = sharp_maps::load(map, &sharp_maps::LoadOptions::default())?.grid;
+    let course = Course::new(Plan::load(Path::new(plan), grid)?)?;
+    let mut report = match rest.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["serve", seed] => return serve(course.paper_task(Seed(seed.parse()?)), Seed(seed.parse()?)),
+        ["paper", seed, limit] => course.paper(Seed(seed.parse()?), limit.parse()?)?,
+        ["scratch", seed, limit] => course.scratch(Seed(seed.parse()?), limit.parse()?)?,
+        ["fast", seed] => course.fast(Seed(seed.parse()?))?,
+        _ => return Err(usage.into()),
+    };
+    report["option"] = json!(course.leg.id.to_string());
+    report["length_m"] = json!(course.leg.guide.length_m());
+    println!("{report}");
+    Ok(())
+}
+
+/// The option with all that its tasks are made of.
+struct Course {
+    plan: Plan,
+    leg: Arc<Leg>,
+    next: Option<Arc<Leg>>,
+    starts: Arc<Starts>,
+}
+
+impl Course {
+    fn new(plan: Plan) -> Outcome<Self> {
+        let legs = &plan.solution.legs;
+        let length_m = |index: &usize| legs[*index].leg.guide.length_m();
+        let options = (0..legs.len()).filter(|&index| legs[index].leg.id.role() == Role::Option);
+        let index = options.max_by(|a, b| length_m(a).total_cmp(&length_m(b)));
+        let index = index.ok_or("the plan has no option")?;
+        let leg = Arc::clone(&legs[index].leg);
+        let next = legs.get(index + 1).map(|planned| Arc::clone(&planned.leg));
+        let starts = Starts::spread(&plan.workspace, &leg, &StartSpread::default(), STARTS, plan.seed);
+        Ok(Self { leg, next, starts: Arc::new(starts), plan })
+    }
+
+    fn task(&self, form: Form, reward: RewardMode, seed: Seed) -> LegTask {
+        let legs = (Arc::clone(&self.leg), self.next.clone());
+        let noise = (&self.plan.noise, seed);
+        LegTask::new(&self.plan.workspace, legs, form, reward, Arc::clone(&self.starts), noise)
+    }
+
+    /// The paper's observation, action and reward.
+    fn paper_task(&self, seed: Seed) -> LegTask {
+        let form = Form::Absolute { reach_m: self.plan.workspace.robot.waypoint_reach_m };
+        self.task(form, RewardMode::Paper(PseudoReward::default()), seed)
+    }
+
+    fn paper(&self, seed: Seed, limit_s: f64) -> Result<Value, TrainError> {
+        let tasks = vec![self.paper_task(seed.child("environment", 0))];
+        let settings = LearnSettings::new(LearningMode::Paper).train;
+        learn(tasks, self.paper_task(seed.child("judge", 0)), settings, seed, limit_s)
+    }
+
+    /// A correction in the guide's frame, learnt on this option alone.
+    fn scratch(&self, seed: Seed, limit_s: f64) -> Result<Value, TrainError> {
+        let workspace = &self.plan.workspace;
+        let form = prior::form(&workspace.robot, Expectation::new(&self.plan.noise, 1.0));
+        let task = |name, index| {
+            self.task(form, RewardMode::Shaped(ShapedReward::default()), seed.child(name, index))
+        };
+        let tasks = (0..16).map(|index| task("environment", index)).collect();
+        let sac = SacSettings { zero_last_actor_layer: true, ..SacSettings::fast() };
+        learn(tasks, task("judge", 0), TrainSettings { sac, ..TrainSettings::fast() }, seed, limit_s)
+    }
+
+    /// What a plan does for the option: candidates, certificates, training where none suffices.
+    fn fast(&self, seed: Seed) -> Outcome<Value> {
+        let settings = LearnSettings::new(LearningMode::Fast);
+        let lesson = Lesson {
+            workspace: &self.plan.workspace,
+            leg: &self.leg,
+            next: self.next.as_ref(),
+            tail: &[],
+            starts: Arc::clone(&self.starts),
+            noise: &self.plan.noise,
+            settings: &settings,
+            seed,
+        };
+        let clock = Clock::start();
+        let learnt = lesson.learn(&|| false).map_err(|failure| format!("{failure:?}"))?;
+        let best = learnt.verified.rate();
+        Ok(clock.report(best >= WANTED, best, (learnt.env_steps, learnt.gradient_steps), &[]))
+    }
+}
+
+/// Trains until [`judge`] is content, the steps of `settings` are used up or `limit_s` have passed.
+fn learn(
+    mut tasks: Vec<LegTask>,
+    judged: LegTask,
+    settings: TrainSettings,
+    seed: Seed,
+    limit_s: f64,
+) -> Result<Value, TrainError> {
+    // The judge outside takes the place of the evaluations inside.
+    let settings = TrainSettings {
+        evaluate_every: u64::MAX / 2,
+        evaluation_episodes: 1,
+        stop: StopRule::Never,
+        ..settings
+    };
+    let (mut judged, mut judge_rng) = ([judged], seed.stream("judge", 0));
+    let (mut looks, mut due, mut effort) = (Vec::new(), JUDGE_EVERY, (0, 0));
+    let mut failure = None;
+    let clock = Clock::start();
+    train(&mut tasks, &settings, &mut seed.stream("sac", 0), &mut |progress| {
+        effort = (progress.state.env_steps, progress.state.updates);
+        if effort.0 >= due {
+            due += JUDGE_EVERY;
+            match judge(&mut judged, &progress.state.sac.actor, &mut judge_rng) {
+                Ok(rate) => looks.push((effort.0, rate)),
+                Err(error) => failure = Some(error),
+            }
+        }
+        let reached = looks.last().is_some_and(|look| look.1 >= WANTED);
+        let is_over = reached || failure.is_some() || clock.seconds() > limit_s;
+        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    failure.map_or(Ok(()), Err)?;
+    let best = looks.iter().map(|look| look.1).fold(0.0, f64::max);
+    Ok(clock.report(best >= WANTED, best, effort, &looks))
+}
+
+/// The success rate of the most likely actions: over the first episodes where it is too low, and
+/// otherwise over many fresh ones, because the best of many short looks is lucky.
+fn judge(task: &mut [LegTask], actor: &Actor, rng: &mut Stream) -> Result<f64, TrainError> {
+    let [few, many] = EPISODES;
+    let first = evaluate(task, actor, few, rng)?.success_rate();
+    if first < WANTED {
+        return Ok(first);
+    }
+    // A policy that held at first is worth no more than what it holds then.
+    evaluate(task, actor, many, rng).map(|second: Evaluation| second.success_rate().min(first))
+}
+
+/// Time since the beginning, by the wall and by the processor.
+struct Clock {
+    begun: Instant,
+    cpu_s: f64,
+}
+
+impl Clock {
+    fn start() -> Self {
+        Self { begun: Instant::now(), cpu_s: cpu_seconds() }
+    }
+
+    fn seconds(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    /// The JSON object on stdout; `looks` are pairs of steps and success.
+    fn report(&self, reached: bool, best: f64, (steps, updates): (u64, u64), looks: &[(u64, f64)]) -> Value {
+        json!({
+            "name": "sharp", "reached": reached, "seconds": self.seconds(),
+            "cpu_seconds": cpu_seconds() - self.cpu_s, "steps": steps, "updates": updates,
+            "best": best, "looks": looks,
+        })
+    }
+}
+
+/// Processor time of all threads of this process, seconds; NaN where Linux does not tell.
+fn cpu_seconds() -> f64 {
+    // Fields 14 and 15 of proc(5), in hundredths; names end at the last bracket.
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = text.rsplit(") ").next().unwrap_or_default().split(' ').skip(11).take(2);
+    let ticks: Option<Vec<f64>> = fields.map(|field| field.parse().ok()).collect();
+    ticks.filter(|ticks| ticks.len() == 2).map_or(f64::NAN, |ticks| (ticks[0] + ticks[1]) / 100.0)
+}
+
+/// Runs `task` for whoever writes requests to stdin and reads answers from stdout.
+///
+/// First come the lengths of observation and action, each four bytes, little endian as all that
+/// follows. The request `r` begins an episode and is answered by the observation; the request `s`
+/// with the components of an action makes a step and is answered by the observation, the reward and
+/// a byte: 1 for terminated, 2 for truncated, 4 for success. Components and rewards are `f32`.
+fn serve(mut task: LegTask, seed: Seed) -> Outcome<()> {
+    let (mut requests, mut answers) = (std::io::stdin().lock(), std::io::stdout().lock());
+    let spec = task.spec();
+    let (mut observation, mut action) = (vec![0.0; spec.observation_len], vec![0.0_f32; spec.action_len]);
+    for length in [spec.observation_len, spec.action_len] {
+        answers.write_all(&(length as u32).to_le_bytes())?;
+    }
+    answers.flush()?;
+    let mut rng = seed.stream("episodes", 0);
+    let mut request = [0];
+    while requests.read(&mut request)? == 1 {
+        let mut end = Vec::new();
+        if request == *b"r" {
+            task.reset(&mut rng, &mut observation);
+        } else {
+            for component in &mut action {
+                let mut bytes = [0; 4];
+                requests.read_exact(&mut bytes)?;
+                *component = f32::from_le_bytes(bytes);
+            }
+            let step = task.step(&action, &mut observation);
+            end.extend(step.reward.to_le_bytes());
+            end.push(u8::from(step.terminated) | u8::from(step.truncated) << 1 | u8::from(step.success) << 2);
+        }
+        let mut answer: Vec<u8> = observation.iter().flat_map(|value| value.to_le_bytes()).collect();
+        answer.extend(end);
+        answers.write_all(&answer)?;
+        answers.flush()?;
+    }
+    Ok(())
+}
