@@ -17,7 +17,7 @@ const SUITE: [&str; 10] = [
     "--methods",
     "sharp,track",
     "--options",
-    "centroid",
+    "interface",
     "--problems",
     "2,4",
     "--episodes",
@@ -116,7 +116,7 @@ fn jobs_run_in_any_order_at_once_and_twice() {
     assert_eq!(early.status.code(), Some(3), "{early:?}");
     let message = String::from_utf8_lossy(&early.stderr).into_owned();
     assert!(
-        message.contains("job 0 (a-husky-centroid-") && message.contains("problem 2 is missing"),
+        message.contains("job 0 (a-husky-interface-") && message.contains("problem 2 is missing"),
         "{message}"
     );
 
