@@ -20,6 +20,8 @@ use crate::stats::Tally;
 const TRAIN_BELOW: f64 = 0.97;
 /// Legs after a repaired one that judge how it arrives.
 const TAIL_LEGS: usize = 2;
+/// A plan that holds less often than this may be better off with one policy for all of its new legs.
+const RIVALS_BELOW: f64 = 0.95;
 /// Gain below which a repaired policy counts as no better, share of episodes: luck explains less.
 const GAIN_MIN: f64 = 0.003;
 
@@ -32,11 +34,12 @@ impl Run<'_> {
             if self.monitor.should_stop() {
                 return Ok(false);
             }
-            if certificate(&runs).tally.rate() >= self.settings.wanted_success {
+            let rate = certificate(&runs).tally.rate();
+            if rate >= self.settings.wanted_success {
                 break;
             }
             let before: Vec<Learnt> = legs.iter().map(|leg| self.learnt[&leg.id].clone()).collect();
-            let changed = (round == 0 && self.try_rivals(legs, &runs)?)
+            let changed = (round == 0 && rate < RIVALS_BELOW && self.try_rivals(legs, &runs)?)
                 || self.relearn_weak(legs, &runs, u64::from(round))?;
             if !changed {
                 break;
