@@ -33,6 +33,9 @@ const ROOM_ENOUGH_M: f64 = 0.25;
 /// Room that keeping to the normal is worth, metres a radian.
 const NORMAL_M_PER_RAD: f64 = 0.1;
 
+/// What a join costs that the robot should not be able to make, where no plan does without one, seconds.
+const HARD_JOIN_S: f64 = 120.0;
+
 /// A car turns no further than this in its stride, however much room it has: 120 degrees.
 const CAR_TURN_MAX_RAD: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
 
@@ -157,7 +160,11 @@ impl<'a> Planner<'a> {
             monitor.phase(Phase::Search);
             let top_speed = self.workspace.robot.max_speed_mps;
             let cost = |leg: &Candidate| self.cost(leg, measured(leg.id));
-            let (_, ids) = self.graph.search(top_speed, cost, |before, after| self.join(before, after))?;
+            let strict = |before: &Candidate, after: &Candidate| self.join(before, after);
+            // A hand-over that may fail is better than no plan: what it is worth will be measured.
+            let lenient = |before: &Candidate, after: &Candidate| strict(before, after).min(HARD_JOIN_S);
+            let found = self.graph.search(top_speed, cost, strict);
+            let (_, ids) = found.or_else(|| self.graph.search(top_speed, cost, lenient))?;
             let missing: Vec<LegId> =
                 ids.iter().copied().filter(|id| !self.guided.contains_key(id)).collect();
             if missing.is_empty() {
@@ -191,7 +198,7 @@ impl<'a> Planner<'a> {
         measured.map_or(estimated, |seconds| seconds.max(least_s)) + shortcut_s
     }
 
-    /// Seconds lost where one guide ends and the next begins; infinite where the robot cannot turn so.
+    /// Seconds lost where one guide ends and the next begins; infinite where the robot should not turn so.
     fn join(&self, before: &Candidate, after: &Candidate) -> f64 {
         let (Some(Ok(first)), Some(Ok(second))) = (self.guided.get(&before.id), self.guided.get(&after.id))
         else {
@@ -346,6 +353,33 @@ mod tests {
         let planner = Planner::new(&world.0, &world.1, settings, query, [], Seed(1));
         let third = planner.expect("both ends have a state").plan(&slow, &()).expect("the first way");
         assert_eq!(names(&third), names(&first), "without the update nothing flows back");
+    }
+
+    /// A corridor of 1.6 m with a corner, and regions on both sides of it.
+    const CORNER: &str = "
+        ###############
+        #.............#
+        #.............#
+        #..0..1.......#
+        #.............#
+        #########.....#
+        #########.....#
+        #########.....#
+        #########..2..#
+        #########.....#
+        #########.....#
+        ###############";
+
+    #[test]
+    fn a_turn_that_is_too_sharp_is_better_than_no_plan() {
+        let world = world(CORNER, OptionKind::Centroid);
+        let query = Query { start: Pose::new(1.2, 3.2, 0.0), goal: Pose::new(4.6, 1.2, 0.0) };
+        for smooth_turn_rad in [75.0_f64.to_radians(), 0.01] {
+            let settings = SearchSettings { smooth_turn_rad, ..SearchSettings::new(&world.0) };
+            let planner = Planner::new(&world.0, &world.1, settings, query, [], Seed(1));
+            let legs = planner.expect("both ends have a state").plan(&|_| None, &());
+            assert!(legs.is_some(), "no plan where turns of {smooth_turn_rad} rad are smooth");
+        }
     }
 
     #[test]
