@@ -45,7 +45,7 @@ impl Run<'_> {
                 break;
             }
             let anew = self.run_plan(legs);
-            if certificate(&anew).cost_s() >= certificate(&runs).cost_s() {
+            if certificate(&anew).tally.successes <= certificate(&runs).tally.successes {
                 for (leg, learnt) in legs.iter().zip(before) {
                     self.keep(leg, learnt)?;
                 }
