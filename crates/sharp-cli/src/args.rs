@@ -5,6 +5,11 @@ mod suites;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Samples of one plan of the baseline `rrt`, unless asked otherwise.
+pub(crate) const RRT_SAMPLES: usize = 30_000;
+/// Environment steps that the baseline `sac` may learn from, unless asked otherwise.
+pub(crate) const MAX_ENV_STEPS: u64 = 1_000_000;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use suites::{Contender, Engine, Eval, Jobs, Selection, Submit, Suite};
@@ -457,10 +462,10 @@ pub(crate) struct Baseline {
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
     /// Samples of one plan of rrt; a plan that takes more has failed.
-    #[arg(long, value_name = "N", default_value_t = 30_000)]
+    #[arg(long, value_name = "N", default_value_t = RRT_SAMPLES)]
     pub(crate) rrt_samples: usize,
     /// Environment steps that sac may learn from; unlike a time limit they give equal bytes.
-    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    #[arg(long, value_name = "N", default_value_t = MAX_ENV_STEPS)]
     pub(crate) max_env_steps: u64,
     /// Write learning curves for TensorBoard there, of sac [default: none].
     #[arg(long, value_name = "DIR")]

@@ -2,6 +2,8 @@
 
 #![allow(clippy::disallowed_methods, reason = "when to kill is a matter of time, how often one of patience")]
 
+mod common;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -10,6 +12,8 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+
+use crate::common::results;
 
 /// Two problems on one library, and a baseline: a few seconds.
 const SUITE: [&str; 10] = [
@@ -46,19 +50,6 @@ fn sharp(folder: &Path, args: &[&str]) -> Output {
 
 fn eval(folder: &Path, out: &str) -> Output {
     sharp(folder, &[&["eval"], &SUITE[..], &[out]].concat())
-}
-
-/// The results in `folder` without wall times.
-fn results(folder: &Path) -> Vec<Value> {
-    let text = fs::read_to_string(folder.join("results.jsonl")).expect("results");
-    let untimed = |line: &str| {
-        let mut line: Value = serde_json::from_str(line).expect("JSON");
-        for key in ["time_s", "decision_us"] {
-            line.as_object_mut().expect("an object").remove(key).expect("wall times are reported");
-        }
-        line
-    };
-    text.lines().map(untimed).collect()
 }
 
 /// The results of the suite when nothing happens to it, and how long that takes.

@@ -7,6 +7,8 @@
 #![cfg(unix)]
 #![allow(clippy::disallowed_methods, reason = "a cluster is found in the environment and waited for")]
 
+mod common;
+
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -14,7 +16,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
+use crate::common::results;
 
 /// Jobs 0 and 2 are SHARP, 1 and 3 a baseline.
 const SUITE: [&str; 12] = [
@@ -158,19 +160,6 @@ fn parent(pid: u32) -> u32 {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).expect("a running process");
     let line = status.lines().find_map(|line| line.strip_prefix("PPid:")).expect("every process has one");
     line.trim().parse().expect("a number")
-}
-
-/// The results in `folder` without wall times.
-fn results(folder: &Path) -> Vec<Value> {
-    let text = fs::read_to_string(folder.join("results.jsonl")).expect("results");
-    let untimed = |line: &str| {
-        let mut line: Value = serde_json::from_str(line).expect("JSON");
-        for key in ["time_s", "decision_us"] {
-            line.as_object_mut().expect("an object").remove(key).expect("wall times are reported");
-        }
-        line
-    };
-    text.lines().map(untimed).collect()
 }
 
 #[test]

@@ -21,7 +21,7 @@ const OUTLIER: f64 = 25.0;
 
 /// What is believed of one robot in one episode.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Belief {
+pub(crate) struct Belief {
     traits: Traits,
     /// Covariance of yaw share and drift: variance, covariance, variance.
     spread: [f64; 3],
@@ -33,8 +33,7 @@ pub struct Belief {
 
 impl Belief {
     /// The belief of a robot that has not moved yet; `noise` says what to expect.
-    #[must_use]
-    pub fn new(noise: &NoiseModel) -> Self {
+    pub(crate) fn new(noise: &NoiseModel) -> Self {
         let share = 1.0 - 0.5 * noise.slip_max;
         // The variance of a uniform variable.
         let share_spread = noise.slip_max.powi(2) / 12.0;

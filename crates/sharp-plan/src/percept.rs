@@ -69,7 +69,7 @@ pub struct Percept {
     /// driven as a share of what was asked for; means in which older actions count less.
     pub felt: [f64; 2],
     /// What all actions of the episode say of the robot's slip and pull.
-    pub belief: Belief,
+    pub(crate) belief: Belief,
 }
 
 /// What a learnt policy is told before it drives: how careful to be and which noise to expect.

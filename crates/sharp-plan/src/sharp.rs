@@ -292,7 +292,7 @@ impl Run<'_> {
         if self.settings.repair_rounds > 0 && !self.repair(legs)? {
             return Ok(None);
         }
-        let runs = self.run_chain(&self.drivers(legs), self.settings.verify_episodes, "verify", 0);
+        let runs = self.run_chain(&self.drivers(legs), self.settings.verify_episodes, "verify");
         let on_arrival = tallies(&runs, legs.len());
         Ok(Some(self.solution(legs, &runs, &on_arrival)))
     }
@@ -321,8 +321,8 @@ impl Run<'_> {
         legs.iter().enumerate().map(driver).collect()
     }
 
-    fn run_chain(&self, drivers: &[Driver<'_>], episodes: u32, purpose: &str, index: u64) -> Vec<ChainRun> {
-        let seed = self.settings.seed.child(purpose, index);
+    fn run_chain(&self, drivers: &[Driver<'_>], episodes: u32, purpose: &str) -> Vec<ChainRun> {
+        let seed = self.settings.seed.child(purpose, 0);
         let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes, seed };
         trial.of_chain(drivers, RobotState::at_rest(self.query.start))
     }

@@ -12,7 +12,10 @@ use super::machine::machine;
 use super::manifest::Job;
 use super::spec::{SharpSpec, Spec, map_args, word};
 use super::step::Step;
-use crate::args::{AbstractionArgs, Baseline, Collisions, Contender, Guide, Method, Metric, Solve, Switch};
+use crate::args::{
+    AbstractionArgs, Baseline, Collisions, Contender, Guide, MAX_ENV_STEPS, Method, Metric, RRT_SAMPLES,
+    Solve, Switch,
+};
 use crate::commands::baseline::{BaselineReport, measure};
 use crate::commands::solve::{Solved, solve_problem};
 use crate::evaluation::ResultLine;
@@ -225,8 +228,8 @@ fn baseline_args(spec: &Spec, problem: usize) -> Baseline {
         simulator: SIMULATOR.to_owned(),
         collisions,
         time_limit: Some(spec.time_limit_s),
-        rrt_samples: 30_000,
-        max_env_steps: 1_000_000,
+        rrt_samples: RRT_SAMPLES,
+        max_env_steps: MAX_ENV_STEPS,
         tensorboard: None,
     }
 }

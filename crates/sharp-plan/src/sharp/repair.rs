@@ -34,18 +34,18 @@ impl Run<'_> {
             if self.monitor.should_stop() {
                 return Ok(false);
             }
-            let rate = certificate(&runs).tally.rate();
-            if rate >= self.settings.wanted_success {
+            let tally = certificate(&runs).tally;
+            if tally.rate() >= self.settings.wanted_success {
                 break;
             }
             let before: Vec<Learnt> = legs.iter().map(|leg| self.learnt[&leg.id].clone()).collect();
-            let changed = (round == 0 && rate < RIVALS_BELOW && self.try_rivals(legs, &runs)?)
+            let changed = (round == 0 && tally.rate() < RIVALS_BELOW && self.try_rivals(legs, &runs)?)
                 || self.relearn_weak(legs, &runs, u64::from(round))?;
             if !changed {
                 break;
             }
             let anew = self.run_plan(legs);
-            if certificate(&anew).tally.successes <= certificate(&runs).tally.successes {
+            if certificate(&anew).tally.successes <= tally.successes {
                 for (leg, learnt) in legs.iter().zip(before) {
                     self.keep(leg, learnt)?;
                 }
@@ -58,7 +58,7 @@ impl Run<'_> {
 
     /// The runs that repairs are judged by: always the same episodes.
     fn run_plan(&self, legs: &[Arc<Leg>]) -> Vec<ChainRun> {
-        self.run_chain(&self.drivers(legs), self.settings.repair_episodes, "repair", 0)
+        self.run_chain(&self.drivers(legs), self.settings.repair_episodes, "repair")
     }
 
     /// Gives all legs that were learnt in this problem one and the same policy if the plan is better off:
@@ -74,7 +74,7 @@ impl Run<'_> {
             for (driver, _) in drivers.iter_mut().zip(&is_new).filter(|(_, is_new)| **is_new) {
                 driver.policy = &rival;
             }
-            let driven = self.run_chain(&drivers, self.settings.repair_episodes, "repair", 0);
+            let driven = self.run_chain(&drivers, self.settings.repair_episodes, "repair");
             let cost_s = certificate(&driven).cost_s();
             if cost_s < best.0 {
                 best = (cost_s, Some((rival, driven)));
