@@ -7,13 +7,13 @@
 use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Pose;
 
-use crate::model::{Model, Traits};
+use crate::model::{Model, Slopes, Traits};
 use crate::policy::PolarWaypoint;
 
 /// What the model itself may be wrong by over one action, radians and metres.
 const MODEL_SD: f64 = 0.01;
-/// Steps of the differences that stand for derivatives: of a share, of a pull and of a bearing.
-const STEP: f64 = 0.05;
+/// A robot that turns less than this per radian of bearing is not trimmed by more.
+const SLOPE_MIN: f64 = 0.05;
 /// A correction of a bearing beyond this is no correction, radians.
 const TRIM_MAX_RAD: f64 = 0.7;
 /// A surprise beyond so many standard deviations, squared, was no noise.
@@ -59,33 +59,29 @@ impl Belief {
         (before, command): (&RobotState, PolarWaypoint),
         after: &RobotState,
     ) -> Self {
-        self.learn_turn(model, (before, command), after);
-        self.learn_speed(model, (before, command), after);
+        let mut expected = *before;
+        let slopes = model.act_with_slopes(&mut expected, command, &self.traits);
+        self.learn_turn((before, command), (&expected, &slopes), after);
+        self.learn_speed(before, &expected, after);
         self
     }
 
     fn learn_turn(
         &mut self,
-        model: &Model,
         (before, command): (&RobotState, PolarWaypoint),
+        (expected, slopes): (&RobotState, &Slopes),
         after: &RobotState,
     ) {
         let Self { traits, spread: [yy, yd, dd], hidden: [gain_sd, waypoint_sd_m], .. } = self;
-        let turn = |command, traits: &Traits| model.turn_rad(before, command, traits);
-        let expected = turn(command, traits);
-        let by_yaw =
-            (turn(command, &Traits { yaw_share: traits.yaw_share + STEP, ..*traits }) - expected) / STEP;
-        let by_drift =
-            (turn(command, &Traits { drift_radps: traits.drift_radps + STEP, ..*traits }) - expected) / STEP;
-        let turned = PolarWaypoint { bearing_rad: command.bearing_rad + STEP, ..command };
-        let by_bearing = (turn(turned, traits) - expected) / STEP;
+        let Slopes { by_yaw, by_drift, by_bearing } = *slopes;
+        let expected_rad = before.pose.heading.turn_to(expected.pose.heading);
         let bearing_sd = *waypoint_sd_m / command.reach_m.max(0.1);
         let doubt = (by_bearing * bearing_sd).powi(2)
             + (by_yaw * *gain_sd * traits.yaw_share).powi(2)
             + MODEL_SD.powi(2);
         let (ky, kd) = (*yy * by_yaw + *yd * by_drift, *yd * by_yaw + *dd * by_drift);
         let total = by_yaw * ky + by_drift * kd + doubt;
-        let miss = before.pose.heading.turn_to(after.pose.heading) - expected;
+        let miss = before.pose.heading.turn_to(after.pose.heading) - expected_rad;
         if miss * miss > OUTLIER * total {
             return;
         }
@@ -94,15 +90,8 @@ impl Belief {
         (*yy, *yd, *dd) = (*yy - ky * ky / total, *yd - ky * kd / total, *dd - kd * kd / total);
     }
 
-    fn learn_speed(
-        &mut self,
-        model: &Model,
-        (before, command): (&RobotState, PolarWaypoint),
-        after: &RobotState,
-    ) {
+    fn learn_speed(&mut self, before: &RobotState, expected: &RobotState, after: &RobotState) {
         let Self { traits, speed_spread, hidden: [gain_sd, _], .. } = self;
-        let mut expected = *before;
-        model.act(&mut expected, command, traits, |_| true);
         let expected_m = before.pose.distance_m(&expected.pose);
         let by_share = expected_m / traits.speed_share;
         let doubt = (by_share * *gain_sd * traits.speed_share).powi(2) + MODEL_SD.powi(2);
@@ -121,11 +110,11 @@ impl Belief {
     pub(crate) fn trim(&self, model: &Model, wanted: PolarWaypoint, share: f64) -> Trim {
         let mut state = RobotState::at_rest(Pose::new(0.0, 0.0, 0.0));
         state.wheel_speed_mps = wanted.speed_mps * self.traits.speed_share;
-        let turn_rad =
-            |bearing_rad| model.turn_rad(&state, PolarWaypoint { bearing_rad, ..wanted }, &self.traits);
-        let pulled_rad = turn_rad(0.0);
-        let slope = (turn_rad(STEP) - pulled_rad) / STEP;
-        let bearing_rad = (-pulled_rad / slope.max(STEP)).clamp(-TRIM_MAX_RAD, TRIM_MAX_RAD);
+        let mut pulled = state;
+        let ahead = PolarWaypoint { bearing_rad: 0.0, ..wanted };
+        let slope = model.act_with_slopes(&mut pulled, ahead, &self.traits).by_bearing;
+        let pulled_rad = state.pose.heading.turn_to(pulled.pose.heading);
+        let bearing_rad = (-pulled_rad / slope.max(SLOPE_MIN)).clamp(-TRIM_MAX_RAD, TRIM_MAX_RAD);
         Trim { bearing_rad: share * bearing_rad, speed_share: self.traits.speed_share }
     }
 }
@@ -194,8 +183,12 @@ mod tests {
             let command = believed(&robot, &truth).trim(&model, AHEAD, 1.0).applied(AHEAD);
             let mut state = RobotState::at_rest(Pose::new(0.0, 0.0, 0.0));
             state.wheel_speed_mps = 0.5;
-            let plain_rad = model.turn_rad(&state, AHEAD, &truth);
-            let trimmed_rad = model.turn_rad(&state, command, &truth);
+            let turn_rad = |waypoint| {
+                let mut after = state;
+                model.act(&mut after, waypoint, &truth, |_| true);
+                after.pose.heading.radians()
+            };
+            let (plain_rad, trimmed_rad) = (turn_rad(AHEAD), turn_rad(command));
             assert!(plain_rad > 0.02, "{} is pulled to the left: {plain_rad}", robot.name);
             assert!(trimmed_rad.abs() < 0.6 * plain_rad, "{}: {trimmed_rad} of {plain_rad}", robot.name);
             assert!(command.bearing_rad < 0.0, "{} steers against it", robot.name);

@@ -1,5 +1,7 @@
 //! Certification: how often a policy holds, counted on fresh episodes.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use sharp_sim::{NoiseModel, RobotState, Simulator, Vehicle};
 use sharp_space::Seed;
@@ -20,6 +22,8 @@ pub struct Certificate {
     pub mean_time_s: f64,
 }
 
+/// Episodes that are driven before anybody asks whether to go on.
+const BLOCK: u32 = 128;
 /// What a failure costs, seconds: somebody has to walk there and free the robot.
 const FAILURE_S: f64 = 1000.0;
 
@@ -64,13 +68,33 @@ impl Trial<'_> {
     /// Runs `drivers` one after the other from `starts`; a success is to arrive where the last one leads.
     #[must_use]
     pub fn of_legs(&self, drivers: &[Driver<'_>], starts: &Starts) -> Certificate {
-        let ends =
-            self.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
-                let state = starts.draw(&mut self.seed.stream("trial start", episode));
-                vehicle.reset(state, self.seed, episode);
-                let run = drive_chain(self.workspace, vehicle, state, drivers, scratch);
-                (run.passed(drivers.len() - 1), run.times_s.iter().sum())
-            });
+        self.of_legs_while(drivers, starts, u32::MAX)
+    }
+
+    /// The same, but gives up soon after more than `failures_max` failures: with fewer episodes than asked for.
+    #[must_use]
+    pub(crate) fn of_legs_while(
+        &self,
+        drivers: &[Driver<'_>],
+        starts: &Starts,
+        failures_max: u32,
+    ) -> Certificate {
+        let vehicle = kinematic_vehicle(self.workspace, self.noise, true);
+        let drive = |vehicle: &mut Vehicle<_>, scratch: &mut DecisionScratch, episode| {
+            let state = starts.draw(&mut self.seed.stream("trial start", episode));
+            vehicle.reset(state, self.seed, episode);
+            let run = drive_chain(self.workspace, vehicle, state, drivers, scratch);
+            (run.passed(drivers.len() - 1), run.times_s.iter().sum())
+        };
+        let mut ends: Vec<(bool, f64)> = Vec::with_capacity(self.episodes as usize);
+        let (mut next, mut failures) = (0, 0);
+        while next < self.episodes && failures <= failures_max {
+            let last = self.episodes.min(next + BLOCK);
+            let block = self.run(&vehicle, next..last, drive);
+            failures += block.iter().filter(|end| !end.0).count() as u32;
+            ends.extend(block);
+            next = last;
+        }
         Certificate::of(ends.into_iter())
     }
 
@@ -79,8 +103,10 @@ impl Trial<'_> {
     pub fn exits(&self, driver: &Driver<'_>, states: &[RobotState]) -> Vec<RobotState> {
         let trial = Trial { episodes: states.len() as u32, ..*self };
         let horizon = driver.leg.horizon_actions(crate::SLOWEST_REACH_M);
-        let ends =
-            trial.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
+        let ends = trial.run(
+            &kinematic_vehicle(self.workspace, self.noise, true),
+            0..trial.episodes,
+            |vehicle, scratch, episode| {
                 let state = states[episode as usize];
                 vehicle.reset(state, self.seed.child("exit", 0), episode);
                 driver.drive(self.workspace, vehicle, Percept::first(state, self.noise), horizon, scratch)
@@ -91,7 +117,8 @@ impl Trial<'_> {
     /// Runs the chain of `drivers` from `start`.
     #[must_use]
     pub fn of_chain(&self, drivers: &[Driver<'_>], start: RobotState) -> Vec<ChainRun> {
-        self.run(kinematic_vehicle(self.workspace, self.noise, true), |vehicle, scratch, episode| {
+        let vehicle = kinematic_vehicle(self.workspace, self.noise, true);
+        self.run(&vehicle, 0..self.episodes, |vehicle, scratch, episode| {
             vehicle.reset(start, self.seed, episode);
             drive_chain(self.workspace, vehicle, start, drivers, scratch)
         })
@@ -100,10 +127,11 @@ impl Trial<'_> {
     /// Results come in the order of the episodes, whatever thread ran them.
     fn run<S: Simulator + Sync, T: Send>(
         &self,
-        vehicle: Vehicle<S>,
+        vehicle: &Vehicle<S>,
+        episodes: Range<u32>,
         episode: impl Fn(&mut Vehicle<S>, &mut DecisionScratch, u64) -> T + Sync,
     ) -> Vec<T> {
-        (0..self.episodes)
+        episodes
             .into_par_iter()
             .with_min_len(16)
             .map_init(

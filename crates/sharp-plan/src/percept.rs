@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
 use sharp_sim::{ActionSettings, Drive, NoiseModel, RobotModel, RobotState, World};
-use sharp_space::{FootprintChecker, Heading, OccupancyGrid, Pose, Vector};
+use sharp_space::{FootprintChecker, Heading, OccupancyGrid, Pose, Vector, trig};
 
 use crate::belief::Belief;
 use crate::model::Model;
@@ -68,8 +68,8 @@ pub struct Percept {
     /// What noise did of late: turn beyond the bearing asked for, radians an action, and distance
     /// driven as a share of what was asked for; means in which older actions count less.
     pub felt: [f64; 2],
-    /// What all actions of the episode say of the robot's slip and pull.
-    pub(crate) belief: Belief,
+    /// What all actions of the episode say of the robot's slip and pull, where anybody asks.
+    pub(crate) belief: Option<Belief>,
 }
 
 /// What a learnt policy is told before it drives: how careful to be and which noise to expect.
@@ -118,8 +118,13 @@ impl Percept {
     #[must_use]
     pub fn first(state: RobotState, noise: &NoiseModel) -> Self {
         let last_command = PolarWaypoint { reach_m: 0.0, bearing_rad: 0.0, speed_mps: 0.0 };
-        let belief = Belief::new(noise);
+        let belief = Some(Belief::new(noise));
         Self { state, last_displacement: [0.0; 3], last_command, felt: [0.0, 1.0], belief }
+    }
+
+    /// The same for policies that make up for nothing: beliefs take as long as the simulation.
+    pub(crate) fn without_belief(self) -> Self {
+        Self { belief: None, ..self }
     }
 
     /// The percept after `command` moved the robot of `workspace` to `after`.
@@ -131,7 +136,8 @@ impl Percept {
         let asked_m = command.speed_mps.mul_add(ActionSettings::default().action_s, 0.05);
         let now = [turn - command.bearing_rad.clamp(-1.0, 1.0), moved.norm() / asked_m];
         let felt = [0, 1].map(|i| FELT_KEPT * self.felt[i] + (1.0 - FELT_KEPT) * now[i]);
-        let belief = self.belief.after(&workspace.model, (&self.state, command), &after);
+        let belief =
+            self.belief.map(|belief| belief.after(&workspace.model, (&self.state, command), &after));
         Self {
             state: after,
             last_displacement: [moved.x, moved.y, turn],
@@ -198,8 +204,9 @@ pub(crate) fn guide_observation(
     };
     put(tracker.remaining_m.min(4.0) / 4.0);
     put(tracker.cross_track_m.clamp(-1.0, 1.0));
-    put(error.sin());
-    put(error.cos());
+    let (sin, cos) = trig::sin_cos(error);
+    put(sin);
+    put(cos);
     put(percept.state.velocity.x / robot.max_speed_mps);
     put(percept.state.yaw_rate_radps / robot.max_yaw_rate_radps);
     put(match robot.drive {
@@ -240,7 +247,8 @@ pub(crate) fn guide_observation(
 fn ray_length_m(workspace: &Workspace, pose: &Pose, angle_rad: f64) -> f64 {
     let field = workspace.checker.field();
     let half_cell_m = 0.5 * field.frame().resolution_m;
-    let direction = Vector::new(angle_rad.cos(), angle_rad.sin());
+    let (sin, cos) = trig::sin_cos(angle_rad);
+    let direction = Vector::new(cos, sin);
     let mut length_m = 0.0;
     while length_m < RAY_LENGTH_M {
         let point = pose.position + direction * length_m;

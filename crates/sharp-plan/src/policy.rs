@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
 use sharp_rl::{Actor, ActorScratch};
 use sharp_sim::RobotModel;
-use sharp_space::{Heading, Point, Pose, Vector};
+use sharp_space::{Heading, Point, Pose, Vector, trig};
 
 use crate::pace::PacedFollower;
 use crate::percept::{Expectation, Percept, Tracker, Workspace, absolute_observation, guide_observation};
@@ -72,7 +72,7 @@ impl PolarWaypoint {
     #[must_use]
     pub fn of(pose: &Pose, point: Point, speed_mps: f64) -> Self {
         let local = pose.to_local(point);
-        Self { reach_m: local.norm(), bearing_rad: local.y.atan2(local.x), speed_mps }
+        Self { reach_m: local.norm(), bearing_rad: trig::atan2(local.y, local.x), speed_mps }
     }
 }
 
@@ -112,11 +112,11 @@ impl Follower {
         let bearing_rad = match self.rule {
             Rule::Pursuit { look_ahead_m } => {
                 let local = pose.to_local(view.ahead(tracker.arc_m + look_ahead_m).position);
-                local.y.atan2(local.x)
+                trig::atan2(local.y, local.x)
             }
             Rule::Field { look_ahead_m, softness_m } => {
                 let tangent = view.ahead(tracker.arc_m + look_ahead_m).heading;
-                let back = (tracker.cross_track_m / softness_m).atan();
+                let back = trig::atan2(tracker.cross_track_m, softness_m);
                 pose.heading.turn_to(Heading::new(tangent.radians() - back))
             }
         };
@@ -266,6 +266,14 @@ pub struct DecisionScratch {
 }
 
 impl OptionPolicy {
+    /// Returns true if decisions depend on what is believed of the robot's slip and pull.
+    pub(crate) const fn believes(&self) -> bool {
+        match self {
+            Self::Follower(_) | Self::Paced(_) => true,
+            Self::Learnt { .. } => false,
+        }
+    }
+
     /// The next waypoint; deterministic.
     pub fn decide(
         &self,
@@ -278,11 +286,11 @@ impl OptionPolicy {
         match self {
             Self::Follower(follower) => {
                 let wanted = follower.waypoint(&workspace.robot, &percept.state.pose, tracker, view);
-                percept.belief.trim(&workspace.model, wanted, TRIM).applied(wanted)
+                trimmed(workspace, percept, wanted, TRIM)
             }
             Self::Paced(paced) => {
                 let wanted = paced.waypoint(workspace, &percept.state.pose, tracker, view);
-                percept.belief.trim(&workspace.model, wanted, paced.trim).applied(wanted)
+                trimmed(workspace, percept, wanted, paced.trim)
             }
             Self::Learnt { form, actor } => {
                 scratch.observation.resize(form.observation_len(), 0.0);
@@ -292,6 +300,11 @@ impl OptionPolicy {
             }
         }
     }
+}
+
+/// `wanted`, with `share` of the pull that the robot is believed to have made up for.
+fn trimmed(workspace: &Workspace, percept: &Percept, wanted: PolarWaypoint, share: f64) -> PolarWaypoint {
+    percept.belief.map_or(wanted, |belief| belief.trim(&workspace.model, wanted, share).applied(wanted))
 }
 
 #[cfg(test)]

@@ -42,9 +42,18 @@ pub struct Driver<'a> {
     pub policy: &'a OptionPolicy,
     /// The guide of the leg after it.
     pub next: Option<&'a GuidePath>,
+    /// Arc length of the guide from which on the leg counts as done, metres; infinite where only its
+    /// termination set ends it.
+    pub until_m: f64,
 }
 
-impl Driver<'_> {
+impl<'a> Driver<'a> {
+    /// Drives `leg` by `policy` to its end; `next` is the leg after it.
+    #[must_use]
+    pub fn new(leg: &'a Leg, policy: &'a OptionPolicy, next: Option<&'a Leg>) -> Self {
+        Self { leg, policy, next: next.map(|next| &next.guide), until_m: f64::INFINITY }
+    }
+
     fn view(&self) -> GuideView<'_> {
         GuideView { guide: &self.leg.guide, next: self.next }
     }
@@ -62,7 +71,7 @@ impl Driver<'_> {
         let (mut time_s, mut path_m, mut stray_actions) = (0.0, 0.0, 0);
         let mut outcome = LegOutcome::TimedOut;
         for _ in 0..=horizon {
-            if self.leg.is_done(&percept.state.pose) {
+            if self.leg.is_done(&percept.state.pose) || tracker.arc_m >= self.until_m {
                 outcome = LegOutcome::Done;
                 break;
             }
@@ -112,6 +121,9 @@ pub fn drive_chain<S: Simulator>(
 ) -> ChainRun {
     let mut run = ChainRun { entries: vec![], times_s: vec![], outcome: LegOutcome::Done };
     let mut percept = Percept::first(start, vehicle.noise());
+    if !drivers.iter().any(|driver| driver.policy.believes()) {
+        percept = percept.without_belief();
+    }
     for driver in drivers {
         run.entries.push(percept.state);
         let horizon = driver.leg.horizon_actions(crate::SLOWEST_REACH_M);
@@ -142,7 +154,7 @@ mod tests {
             let legs = &plan.solution.legs;
             let drivers: Vec<Driver<'_>> = legs
                 .iter()
-                .map(|planned| Driver { leg: &planned.leg, policy: &planned.learnt.policy, next: None })
+                .map(|planned| Driver::new(&planned.leg, &planned.learnt.policy, None))
                 .collect();
             let start = RobotState::at_rest(plan.solution.query.start);
             let mut vehicle = crate::learn::kinematic_vehicle(&plan.workspace, &NoiseModel::none(), true);

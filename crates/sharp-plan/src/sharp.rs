@@ -299,7 +299,8 @@ impl Run<'_> {
 
     fn lesson<'b>(&'b self, leg: &'b Arc<Leg>, starts: Starts, seed: Seed) -> Lesson<'b> {
         let (workspace, noise, settings) = (self.workspace, &self.settings.noise, &self.settings.learn);
-        Lesson { workspace, leg, next: None, tail: &[], starts: Arc::new(starts), noise, settings, seed }
+        let starts = Arc::new(starts);
+        Lesson { workspace, leg, next: None, tail: &[], starts, noise, settings, seed }
     }
 
     fn starts(&self, leg: &Leg, seed: Seed) -> Starts {
@@ -312,11 +313,8 @@ impl Run<'_> {
     }
 
     fn drivers<'b>(&'b self, legs: &'b [Arc<Leg>]) -> Vec<Driver<'b>> {
-        let next = |index: usize| legs.get(index + 1).map(|leg| &leg.guide);
-        let driver = |(index, leg): (usize, &'b Arc<Leg>)| Driver {
-            leg,
-            policy: &self.learnt[&leg.id].policy,
-            next: next(index),
+        let driver = |(index, leg): (usize, &'b Arc<Leg>)| {
+            Driver::new(leg, &self.learnt[&leg.id].policy, legs.get(index + 1).map(AsRef::as_ref))
         };
         legs.iter().enumerate().map(driver).collect()
     }

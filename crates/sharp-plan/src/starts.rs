@@ -121,7 +121,7 @@ impl<'a> ViabilityProbe<'a> {
             return false;
         }
         self.vehicle.reset(state, self.seed, 0);
-        let driver = Driver { leg: self.leg, policy: &self.policy, next: None };
+        let driver = Driver::new(self.leg, &self.policy, None);
         let percept = crate::percept::Percept::first(state, self.vehicle.noise());
         driver.drive(self.workspace, &mut self.vehicle, percept, 5, &mut self.scratch).outcome
             != LegOutcome::Contact

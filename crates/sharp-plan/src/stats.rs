@@ -26,6 +26,12 @@ impl Tally {
         Self { episodes: self.episodes + 1, successes: self.successes + success as u32 }
     }
 
+    /// Trials that did not succeed.
+    #[must_use]
+    pub const fn failures(&self) -> u32 {
+        self.episodes - self.successes
+    }
+
     /// The share of successes; 0 before the first trial.
     #[must_use]
     pub fn rate(&self) -> f64 {

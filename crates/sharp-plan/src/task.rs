@@ -75,7 +75,7 @@ impl Environment for LegTask {
         let state = self.starts.draw(rng);
         // The caller's stream numbers the episode, so that a clone does not repeat its original.
         self.vehicle.reset(state, self.seed, rng.random());
-        let percept = Percept::first(state, self.vehicle.noise());
+        let percept = Percept::first(state, self.vehicle.noise()).without_belief();
         self.tracker = Tracker::start(&self.leg.guide, &state.pose);
         self.actions = 0;
         self.observe(&percept, observation);

@@ -3,7 +3,7 @@
 //! The actions of the paper's policies are points that the robot's own controller drives to. The
 //! controller knows the robot's limits and its mean yaw gain, nothing of the noise.
 
-use sharp_space::{Point, Pose, Vector};
+use sharp_space::{Point, Pose, Vector, trig};
 
 use crate::robot::{Drive, RobotModel};
 use crate::state::{Command, RobotState};
@@ -11,7 +11,7 @@ use crate::state::{Command, RobotState};
 /// Turn per bearing, 1/s: a quarter of a second to face the waypoint, well above the control period.
 const BEARING_GAIN_PS: f64 = 4.0;
 /// Bearing beyond which a robot turns in place: 60 degrees.
-const TURN_IN_PLACE_RAD: f64 = std::f64::consts::FRAC_PI_3;
+const TURN_IN_PLACE_COS: f64 = 0.5;
 /// Least distance of the point steered at. Nearer points would turn the robot wildly as it arrives.
 const LOOK_AHEAD_M: f64 = 0.25;
 
@@ -66,22 +66,50 @@ impl WaypointController {
     /// The command for the next control period.
     #[must_use]
     pub fn command(&self, state: &RobotState, aim: &Aim) -> Command {
+        self.towards(self.target(state, aim), aim.speed_mps)
+    }
+
+    /// The same, and what a waypoint turned by one radian would change: the yaw rate, rad/s, or the steering
+    /// angle, rad; 0 where the robot already turns as much as it can.
+    #[must_use]
+    pub fn command_and_slope(&self, state: &RobotState, aim: &Aim) -> (Command, f64) {
+        let target = self.target(state, aim);
+        let command = self.towards(target, aim.speed_mps);
+        let slope = match (self.drive, command) {
+            (Drive::Differential { .. }, Command::Twist { yaw_rate_radps, .. }) => {
+                let saturates = (yaw_rate_radps * self.yaw_gain).abs() >= self.max_yaw_rate_radps;
+                if saturates || aim.speed_mps <= 0.0 { 0.0 } else { BEARING_GAIN_PS / self.yaw_gain }
+            }
+            (Drive::Ackermann { wheelbase_m, max_steer_rad, .. }, Command::Steer { steer_rad, .. }) => {
+                if steer_rad.abs() >= max_steer_rad { 0.0 } else { pursuit_slope(target, wheelbase_m) }
+            }
+            _ => 0.0,
+        };
+        (command, slope)
+    }
+
+    /// The point steered at, as the robot sees it.
+    fn target(&self, state: &RobotState, aim: &Aim) -> Vector {
         let left_m = (aim.waypoint - state.pose.position).dot(&aim.direction);
         let beyond_m = (LOOK_AHEAD_M - left_m).max(0.0);
-        let target = state.pose.to_local(aim.waypoint + aim.direction * beyond_m);
+        state.pose.to_local(aim.waypoint + aim.direction * beyond_m)
+    }
+
+    fn towards(&self, target: Vector, speed_mps: f64) -> Command {
         match self.drive {
-            Drive::Differential { .. } => self.turn_towards(target, aim.speed_mps),
-            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => Command::Steer {
-                speed_mps: aim.speed_mps,
-                steer_rad: pursue(target, wheelbase_m, max_steer_rad),
-            },
+            Drive::Differential { .. } => self.turn_towards(target, speed_mps),
+            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => {
+                Command::Steer { speed_mps, steer_rad: pursue(target, wheelbase_m, max_steer_rad) }
+            }
         }
     }
 
     fn turn_towards(&self, target: Vector, speed_mps: f64) -> Command {
-        let bearing = target.y.atan2(target.x);
+        let bearing = trig::atan2(target.y, target.x);
         // 1 straight ahead, 0 from the bearing on at which it turns in place.
-        let ahead = (bearing.cos() - TURN_IN_PLACE_RAD.cos()) / (1.0 - TURN_IN_PLACE_RAD.cos());
+        let distance_m = target.norm();
+        let cos = if distance_m > 0.0 { target.x / distance_m } else { 1.0 };
+        let ahead = (cos - TURN_IN_PLACE_COS) / (1.0 - TURN_IN_PLACE_COS);
         let turn = (BEARING_GAIN_PS * bearing).clamp(-self.max_yaw_rate_radps, self.max_yaw_rate_radps);
         let moving = if speed_mps > 0.0 { 1.0 } else { 0.0 };
         Command::Twist {
@@ -99,5 +127,15 @@ fn pursue(target: Vector, wheelbase_m: f64, max_steer_rad: f64) -> f64 {
         return if from_axle.y < 0.0 { -max_steer_rad } else { max_steer_rad };
     }
     let curvature = 2.0 * from_axle.y / from_axle.norm_squared();
-    (wheelbase_m * curvature).atan().clamp(-max_steer_rad, max_steer_rad)
+    trig::atan2(wheelbase_m * curvature, 1.0).clamp(-max_steer_rad, max_steer_rad)
+}
+
+/// The derivative of [`pursue`] where it is below full lock, as `target` turns around the robot's centre.
+fn pursuit_slope(target: Vector, wheelbase_m: f64) -> f64 {
+    let from_axle = target + Vector::new(wheelbase_m / 2.0, 0.0);
+    let turned = Vector::new(-target.y, target.x);
+    let square = from_axle.norm_squared();
+    let curvature = 2.0 * from_axle.y / square;
+    let change = (2.0 * turned.y - 2.0 * curvature * from_axle.dot(&turned)) / square;
+    wheelbase_m * change / (1.0 + (wheelbase_m * curvature).powi(2))
 }

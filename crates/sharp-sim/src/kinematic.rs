@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use sharp_space::{Heading, Pose, Vector};
+use sharp_space::{Heading, Pose, Vector, trig};
 
 use crate::contact::ContactGuard;
 use crate::robot::RobotModel;
@@ -54,7 +54,7 @@ impl Simulator for KinematicSim {
         if is_free {
             self.state.pose = pose;
             // The velocity stays in the world while the body turns under it.
-            let (sin, cos) = turn.sin_cos();
+            let (sin, cos) = trig::sin_cos(turn);
             self.state.velocity =
                 Vector::new(cos * velocity.x + sin * velocity.y, cos * velocity.y - sin * velocity.x);
             self.state.yaw_rate_radps = yaw_rate_radps;

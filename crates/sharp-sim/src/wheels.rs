@@ -4,7 +4,7 @@
 //! wheel rolls, by a friction that grows with the slip and saturates at Coulomb's limit. Both
 //! simulators share it, so that they agree wherever nothing is touched.
 
-use sharp_space::{Vector, wrap_angle};
+use sharp_space::{Vector, trig, wrap_angle};
 
 use crate::robot::{Drive, RobotModel};
 use crate::state::{Command, RobotState};
@@ -55,7 +55,7 @@ impl Wheels {
             Drive::Differential { wheelbase_m, .. } => {
                 let target = match command {
                     Command::Twist { yaw_rate_radps, .. } => yaw_rate_radps,
-                    Command::Steer { speed_mps, steer_rad } => speed_mps * steer_rad.tan() / wheelbase_m,
+                    Command::Steer { speed_mps, steer_rad } => speed_mps * trig::tan(steer_rad) / wheelbase_m,
                 };
                 let step = self.max_yaw_accel_radps2 * dt_s;
                 state.wheel_yaw_rate_radps = approach(state.wheel_yaw_rate_radps, target, step);
@@ -85,7 +85,9 @@ impl Wheels {
         for contact in &self.contacts {
             let lateral = state.yaw_rate_radps - turn.lateral_rate_radps;
             let slip = slide + Vector::new(-spin * contact.y, lateral * contact.x);
-            let share = 0.25 * (limit / slip.norm()).min(1.0);
+            // Most contacts hold: no root, no division.
+            let square = slip.norm_squared();
+            let share = if square <= limit * limit { 0.25 } else { 0.25 * limit / square.sqrt() };
             let change = slip * -share;
             velocity += change;
             moment += contact.x * change.y - contact.y * change.x;
@@ -103,7 +105,7 @@ impl Wheels {
                 Turn { rate_radps: state.wheel_yaw_rate_radps, lateral_rate_radps: 0.0 },
             ),
             Drive::Ackermann { wheelbase_m, .. } => {
-                let rate_radps = speed * state.steer_rad.tan() / wheelbase_m;
+                let rate_radps = speed * trig::tan(state.steer_rad) / wheelbase_m;
                 // The rear axle does not move sideways; the reference point is half a wheelbase ahead.
                 (
                     Vector::new(speed, rate_radps * wheelbase_m / 2.0),
@@ -125,7 +127,7 @@ struct Turn {
 
 /// The steering angle that turns a car at `yaw_rate_radps` while it drives at `speed_mps`.
 fn steer_for(speed_mps: f64, yaw_rate_radps: f64, wheelbase_m: f64) -> f64 {
-    let steer_rad = (wheelbase_m * yaw_rate_radps).atan2(speed_mps.abs());
+    let steer_rad = trig::atan2(wheelbase_m * yaw_rate_radps, speed_mps.abs());
     if speed_mps < 0.0 { wrap_angle(-steer_rad) } else { steer_rad }
 }
 

@@ -25,6 +25,7 @@ mod region;
 mod seed;
 
 pub mod floorplan;
+pub mod trig;
 
 pub use bounds::Bounds;
 pub use collision::{CollisionChecker, FootprintChecker};

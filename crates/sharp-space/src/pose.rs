@@ -4,6 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
+use crate::trig;
+
 /// A position in the world frame, metres.
 pub type Point = nalgebra::Point2<f64>;
 /// A displacement in the world frame, metres.
@@ -12,6 +14,9 @@ pub type Vector = nalgebra::Vector2<f64>;
 /// Returns `angle_rad` wrapped to (−π, π].
 #[must_use]
 pub fn wrap_angle(angle_rad: f64) -> f64 {
+    if angle_rad > -PI && angle_rad <= PI {
+        return angle_rad;
+    }
     let wrapped = angle_rad - TAU * ((angle_rad + PI) / TAU).floor();
     // The formula gives [−π, π); the half-open side moves so that π stays π.
     if wrapped <= -PI { PI } else { wrapped }
@@ -32,7 +37,7 @@ impl Heading {
     /// The direction of `vector`; zero for the null vector.
     #[must_use]
     pub fn of(vector: Vector) -> Self {
-        Self::new(vector.y.atan2(vector.x))
+        Self::new(trig::atan2(vector.y, vector.x))
     }
 
     /// The angle in (−π, π].
@@ -50,7 +55,8 @@ impl Heading {
     /// The unit vector that points this way.
     #[must_use]
     pub fn unit(self) -> Vector {
-        Vector::new(self.0.cos(), self.0.sin())
+        let (sin, cos) = trig::sin_cos(self.0);
+        Vector::new(cos, sin)
     }
 }
 
@@ -112,7 +118,7 @@ impl Pose {
     /// Expresses the world point `point` in this pose's frame (x ahead, y to the left).
     #[must_use]
     pub fn to_local(&self, point: Point) -> Vector {
-        let (sin, cos) = self.heading.0.sin_cos();
+        let (sin, cos) = trig::sin_cos(self.heading.0);
         let d = point - self.position;
         Vector::new(cos * d.x + sin * d.y, -sin * d.x + cos * d.y)
     }
@@ -120,7 +126,7 @@ impl Pose {
     /// Expresses `local` (x ahead, y to the left) in the world frame.
     #[must_use]
     pub fn to_world(&self, local: Vector) -> Point {
-        let (sin, cos) = self.heading.0.sin_cos();
+        let (sin, cos) = trig::sin_cos(self.heading.0);
         self.position + Vector::new(cos * local.x - sin * local.y, sin * local.x + cos * local.y)
     }
 

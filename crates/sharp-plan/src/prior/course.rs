@@ -60,10 +60,9 @@ impl Course {
         seed: Seed,
     ) -> Vec<Certificate> {
         let trial = Trial { workspace: &self.workspace, noise, episodes, seed };
-        let next = |index: usize| self.legs.get(index + 1).map(|leg| &leg.guide);
+        let next = |index: usize| self.legs.get(index + 1).map(AsRef::as_ref);
         let legs = self.legs.iter().zip(&self.starts).enumerate();
-        legs.map(|(index, (leg, starts))| trial.of_leg(&Driver { leg, policy, next: next(index) }, starts))
-            .collect()
+        legs.map(|(index, (leg, starts))| trial.of_leg(&Driver::new(leg, policy, next(index)), starts)).collect()
     }
 }
 
@@ -142,7 +141,7 @@ impl CourseTask {
         let state = starts[leg].draw(rng);
         let mut vehicle = crate::learn::kinematic_vehicle(workspace, &noise, true);
         vehicle.reset(state, self.seed, rng.random());
-        let percept = Percept::first(state, &noise);
+        let percept = Percept::first(state, &noise).without_belief();
         let tracker = Tracker::start(&legs[leg].guide, &state.pose);
         Episode { course, leg, last, form, reward, vehicle, percept, tracker, actions: 0 }
     }

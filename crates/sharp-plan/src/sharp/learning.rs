@@ -49,7 +49,7 @@ impl Run<'_> {
                 }
             }
             let (policy, next) = (&self.learnt[&leg.id].policy, legs.get(index + 1));
-            let driver = Driver { leg, policy, next: next.map(|next| &next.guide) };
+            let driver = Driver::new(leg, policy, next.map(AsRef::as_ref));
             let trial = Trial { workspace: self.workspace, noise: &self.settings.noise, episodes: 0, seed };
             arrivals = trial.exits(&driver, &arrivals);
         }

@@ -13,13 +13,13 @@ use crate::leg::Leg;
 use crate::pace::PacedFollower;
 use crate::policy::OptionPolicy;
 use crate::prior::Prior;
-use crate::rollout::ChainRun;
+use crate::rollout::{ChainRun, Driver};
 use crate::stats::Tally;
 
 /// A leg that holds as often as this on arrival is not trained anew, only chosen anew.
 const TRAIN_BELOW: f64 = 0.97;
-/// Legs after a repaired one that judge how it arrives.
-const TAIL_LEGS: usize = 2;
+/// Way after a repaired leg that judges how it arrives, metres.
+const TAIL_M: f64 = 4.0;
 /// A plan that holds less often than this may be better off with one policy for all of its new legs.
 const RIVALS_BELOW: f64 = 0.95;
 /// Gain below which a repaired policy counts as no better, share of episodes: luck explains less.
@@ -141,17 +141,41 @@ impl Run<'_> {
         if self.learnt[&leg.id].gradient_steps > 0 || on_arrival.rate() >= TRAIN_BELOW {
             settings.train_below = 0.0;
         }
-        let next = legs.get(index + 1);
         let drivers = self.drivers(legs);
-        let tail = &drivers[index + 1..drivers.len().min(index + 1 + TAIL_LEGS)];
-        let lesson = Lesson { settings: &settings, next, tail, ..self.lesson(leg, starts, seed) };
+        let tail = tail(&drivers[index + 1..]);
+        let lesson = Lesson {
+            settings: &settings,
+            next: legs.get(index + 1),
+            tail: &tail,
+            ..self.lesson(leg, starts, seed)
+        };
         let old = &self.learnt[&leg.id];
-        let present = lesson.judge(&old.policy);
-        let (judged, mut new) = lesson.learn_judged(&LegMonitor { monitor: self.monitor, leg }).ok()?;
-        new.env_steps += old.env_steps;
-        new.gradient_steps += old.gradient_steps;
-        (judged.tally.rate() - present.tally.rate() >= GAIN_MIN).then_some(new)
+        let Tally { episodes, successes } = lesson.judge(&old.policy).tally;
+        let failures_allowed = (1.0 - wanted) * f64::from(episodes);
+        if f64::from(episodes - successes) <= failures_allowed {
+            return None;
+        }
+        let gain = (GAIN_MIN * f64::from(episodes)).ceil() as u32;
+        let beaten = Tally { episodes, successes: (successes + gain).min(episodes) - 1 };
+        let new = lesson.learn_fast(&LegMonitor { monitor: self.monitor, leg }, Some(beaten)).ok()??;
+        let (env_steps, gradient_steps) =
+            (new.env_steps + old.env_steps, new.gradient_steps + old.gradient_steps);
+        Some(Learnt { env_steps, gradient_steps, ..new })
     }
+}
+
+/// The beginning of `drivers`, as far as how they were entered can matter.
+fn tail<'a>(drivers: &[Driver<'a>]) -> Vec<Driver<'a>> {
+    let mut left_m = TAIL_M;
+    let mut tail = Vec::new();
+    for &driver in drivers {
+        if left_m <= 0.0 {
+            break;
+        }
+        tail.push(Driver { until_m: left_m, ..driver });
+        left_m -= driver.leg.guide.length_m();
+    }
+    tail
 }
 
 /// The states in which leg number `index` was entered.
