@@ -16,15 +16,17 @@ const HASTE: f64 = 1.6;
 
 /// How the band behaves.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BandSettings {
+pub(crate) struct BandSettings<'a> {
     pub(crate) pull_per_m2: f64,
     pub(crate) stiffness_m: f64,
     /// Directions (in the grid) in which the band leaves its first and arrives at its last point.
     pub(crate) ends: [Option<Vector>; 2],
+    /// Discs that the band has to meet: centre and radius, in cells.
+    pub(crate) discs: &'a [(Vector, f64)],
 }
 
 /// Smooths the polyline `draft` (units of cells); both ends stay.
-pub(crate) fn smooth(floor: &Floor<'_>, draft: &[Vector], settings: &BandSettings) -> Vec<Vector> {
+pub(crate) fn smooth(floor: &Floor<'_>, draft: &[Vector], settings: &BandSettings<'_>) -> Vec<Vector> {
     let resolution = floor.frame().resolution_m;
     let mut points = resample(draft, COARSE_M / resolution, 4);
     let coarse = step_length(&points);
@@ -47,11 +49,24 @@ pub(crate) fn smooth(floor: &Floor<'_>, draft: &[Vector], settings: &BandSetting
             straighten_ends(&mut points, fixed);
         }
         let force = Force::new(settings, spacing, resolution);
+        let tethers = tethers(&points, settings.discs);
         for _ in 0..rounds {
             relax(floor, &mut points, fixed, &force);
+            for &(index, (center, radius)) in &tethers {
+                let off = points[index] - center;
+                points[index] = center + off.cap_magnitude(radius);
+            }
         }
     }
     points
+}
+
+/// For each disc the point that has to stay in it: the one nearest to its centre.
+fn tethers(points: &[Vector], discs: &[(Vector, f64)]) -> Vec<(usize, (Vector, f64))> {
+    let off = |index: usize, center: Vector| (points[index] - center).norm_squared();
+    let nearest =
+        |center: Vector| (1..points.len() - 1).min_by(|&a, &b| off(a, center).total_cmp(&off(b, center)));
+    discs.iter().filter_map(|&disc| nearest(disc.0).map(|index| (index, disc))).collect()
 }
 
 /// The weights of one level; spacing in cells.
@@ -65,7 +80,7 @@ struct Force {
 impl Force {
     /// For unit tension: bending weighs (stiffness / spacing)², and a curvature of `pull` times the
     /// lack of room is in balance.
-    fn new(settings: &BandSettings, spacing: f64, resolution_m: f64) -> Self {
+    fn new(settings: &BandSettings<'_>, spacing: f64, resolution_m: f64) -> Self {
         let spacing_m = spacing * resolution_m;
         let bending = (settings.stiffness_m / spacing_m).powi(2);
         let pull = settings.pull_per_m2 * spacing_m * spacing_m;
@@ -161,7 +176,7 @@ mod tests {
         let field = DistanceField::new(&grid);
         let floor = Floor { field: &field, allowed: &|_| true, least_m: 0.1, comfort_m: 0.5 };
         let draft = [(20.0, 30.0), (40.0, 40.0), (60.0, 30.0)].map(|(x, y)| Vector::new(x, y));
-        let settings = BandSettings { pull_per_m2: 12.0, stiffness_m: 0.6, ends: [None, None] };
+        let settings = BandSettings { pull_per_m2: 12.0, stiffness_m: 0.6, ends: [None, None], discs: &[] };
         let points = smooth(&floor, &draft, &settings);
         let off = points.iter().map(|p| (p.y - 30.0).abs()).fold(0.0, f64::max);
         assert!(off < 0.5, "still {off} cells off the straight");
@@ -175,7 +190,7 @@ mod tests {
         let floor = Floor { field: &field, allowed: &|_| true, least_m: 0.1, comfort_m: 0.5 };
         let draft = [(20.0, 30.0), (60.0, 30.0)].map(|(x, y)| Vector::new(x, y));
         let up = Some(Vector::new(1.0, 1.0).normalize());
-        let settings = BandSettings { pull_per_m2: 12.0, stiffness_m: 0.6, ends: [up, up] };
+        let settings = BandSettings { pull_per_m2: 12.0, stiffness_m: 0.6, ends: [up, up], discs: &[] };
         let points = smooth(&floor, &draft, &settings);
         let turn = |a: Vector, b: Vector| a.angle(&b);
         for pair in points.windows(3) {

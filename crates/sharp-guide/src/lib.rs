@@ -34,7 +34,7 @@ mod workbench;
 
 pub use option_guide::{Abstraction, OptionGuide, Robot};
 pub use path::{GuidePath, GuidePathError, Projection};
-pub use plan::{GuideEnd, GuideRequest, NoGuide, plan_guide};
+pub use plan::{GuideEnd, GuideRequest, NoGuide, plan_guide, smooth_guide};
 pub use reward::{Place, PseudoReward, ShapedReward, StepEvents};
 pub use settings::{GuidePlanner, GuideSettings};
 pub use sharp_motion::Steering;

@@ -1,7 +1,7 @@
 //! Planning of guide paths: draft, smooth, lead in, certify; sample where that fails.
 
 use sharp_motion::Steering;
-use sharp_space::{Cell, FootprintChecker, Heading, Point, Stream};
+use sharp_space::{Cell, FootprintChecker, Heading, Point, Stream, Vector};
 use thiserror::Error;
 
 use crate::path::GuidePath;
@@ -101,6 +101,32 @@ pub fn plan_guide(
     }
     let way = bench.least_way()?;
     sampled_guide(&bench, &way, rng)
+}
+
+/// Smooths `way`, a polyline from the request's start to its goal, into a guide path and certifies it, as
+/// [`plan_guide`] does with a way of its own. It passes through all `discs` (centre and radius, metres).
+///
+/// # Errors
+/// Says what the last attempt failed of.
+pub fn smooth_guide(
+    (way, discs): (&[Point], &[(Point, f64)]),
+    request: &GuideRequest<'_>,
+    checker: &FootprintChecker,
+    steering: &Steering,
+    settings: &GuideSettings,
+) -> Result<GuidePath, NoGuide> {
+    let bench = Workbench::new(request, checker, steering, settings);
+    bench.has_length()?;
+    let frame = checker.field().frame();
+    let points: Vec<Vector> = way.iter().map(|&point| frame.to_grid(point)).collect();
+    let mut last = Err(NoGuide::NoLength(request.start.position));
+    for attempt in attempts(settings, frame.resolution_m) {
+        last = bench.smooth_guide(&bench.floor(attempt.margin_m), (&points, discs), &attempt);
+        if last.is_ok() {
+            break;
+        }
+    }
+    last
 }
 
 /// What is tried in turn: as set; more respect for walls; less, for a rounder path;

@@ -32,7 +32,7 @@ pub(crate) fn sampled_guide(
     let points: Vec<Vector> =
         path.resample(0.2).poses().iter().map(|pose| frame.to_grid(pose.position)).collect();
     if points.len() > 1
-        && let Ok(guide) = bench.smooth_guide(&floor, &points, &draft)
+        && let Ok(guide) = bench.smooth_guide(&floor, (&points, &[]), &draft)
     {
         return Ok(guide);
     }

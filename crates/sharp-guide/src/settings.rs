@@ -38,6 +38,15 @@ pub struct GuideSettings {
     pub seeds: usize,
 }
 
+impl GuideSettings {
+    /// The same without the sampling planner.
+    #[must_use]
+    pub fn unsampled(self) -> Self {
+        let sampling = RrtSettings { budget: Budget { iterations: 0 }, ..self.sampling };
+        Self { sampling, seeds: 0, ..self }
+    }
+}
+
 impl Default for GuideSettings {
     fn default() -> Self {
         Self {

@@ -82,23 +82,27 @@ impl<'a> Workbench<'a> {
     pub(crate) fn ridge_guide(&self, draft: &Draft) -> Result<GuidePath, NoGuide> {
         let floor = self.floor(draft.margin_m);
         let points = self.draft(&floor, draft.weight)?;
-        self.smooth_guide(&floor, &points, draft)
+        self.smooth_guide(&floor, (&points, &[]), draft)
     }
 
-    /// Smooths `points`, leads the robot onto them and certifies the result.
+    /// Smooths `points` into a path that meets all `discs` (centre and radius, metres), leads the robot onto
+    /// it and certifies the result.
     pub(crate) fn smooth_guide(
         &self,
         floor: &Floor<'_>,
-        points: &[Vector],
+        (points, discs): (&[Vector], &[(Point, f64)]),
         draft: &Draft,
     ) -> Result<GuidePath, NoGuide> {
         let (start, mut goal) = (self.request.start, self.request.goal);
         goal.heading = goal.heading.filter(|_| draft.aim_goal);
         let back: Vec<Vector> = points.iter().rev().copied().collect();
         let ends = [self.end(floor, &start, points, 1.0), self.end(floor, &goal, &back, -1.0)];
-        let band =
-            BandSettings { pull_per_m2: draft.pull_per_m2, stiffness_m: self.settings.stiffness_m, ends };
         let frame = floor.frame();
+        let disc =
+            |&(center, radius_m): &(Point, f64)| (frame.to_grid(center), radius_m / frame.resolution_m);
+        let discs: Vec<(Vector, f64)> = discs.iter().map(disc).collect();
+        let (pull_per_m2, stiffness_m) = (draft.pull_per_m2, self.settings.stiffness_m);
+        let band = BandSettings { pull_per_m2, stiffness_m, ends, discs: &discs };
         let smooth: Vec<Point> =
             band::smooth(floor, points, &band).into_iter().map(|point| frame.from_grid(point)).collect();
         let guide = self.lead_in(self.through(smooth)?)?;

@@ -110,7 +110,8 @@ impl Trial<'_> {
                 let state = states[episode as usize];
                 vehicle.reset(state, self.seed.child("exit", 0), episode);
                 driver.drive(self.workspace, vehicle, Percept::first(state, self.noise), horizon, scratch)
-            });
+            },
+        );
         ends.iter().filter(|end| end.outcome == LegOutcome::Done).map(|end| end.percept.state).collect()
     }
 

@@ -47,7 +47,8 @@ pub struct LearnSettings {
     pub mode: LearningMode,
     /// Success wanted of an option, share of episodes.
     pub wanted_success: f64,
-    /// The prior is trained on a leg on which nothing else holds as often as this; 0 for never.
+    /// Where a plan falls short, the prior is trained on a leg on which nothing else holds as often as this;
+    /// 0 for never.
     pub train_below: f64,
     /// Episodes in which candidates are compared.
     pub screening_episodes: u32,
@@ -67,7 +68,7 @@ impl LearnSettings {
             LearningMode::Fast | LearningMode::Prior => Self {
                 mode,
                 wanted_success: 0.99,
-                train_below: if mode == LearningMode::Prior { 0.0 } else { std::env::var("TB").map_or(0.98, |v| v.parse().unwrap()) },
+                train_below: if mode == LearningMode::Prior { 0.0 } else { 0.97 },
                 screening_episodes: 200,
                 certify_episodes: 1000,
                 environments: 16,
@@ -284,10 +285,10 @@ impl Lesson<'_> {
         learnt(policy, certificate, effort)
     }
 
-    /// The cheapest policy at hand that holds as wanted; where none does, the one that holds most
-    /// often, or what the prior learns on this leg.
+    /// The cheapest policy at hand that holds as wanted; where none does, the one that holds most often.
     ///
-    /// With `beaten`, as [`judge`](Self::judge) counts, only what holds more often is of use.
+    /// With `beaten`, as [`judge`](Self::judge) counts, only what holds more often is of use, and the prior
+    /// is trained on this leg where nothing at hand holds often enough.
     pub(crate) fn learn_fast(
         &self,
         monitor: &dyn LessonMonitor,
@@ -315,8 +316,8 @@ impl Lesson<'_> {
                 break;
             }
         }
-        let held = most.map_or(0.0, |most| most.rate());
-        if held < self.settings.train_below {
+        // What a first choice lacks, the plan may not need: training takes longer than all the rest.
+        if beaten.is_some() && most.is_some_and(|most| most.rate() < self.settings.train_below) {
             let trained = self.train_on(monitor)?;
             let alone = Certificate { tally: trained.verified, mean_time_s: trained.mean_time_s };
             let judged = if self.tail.is_empty() { alone } else { self.judge(&trained.policy) };

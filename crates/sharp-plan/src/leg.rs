@@ -81,6 +81,14 @@ impl Target {
         }
     }
 
+    /// The endpoint, unless it is the goal.
+    pub(crate) const fn endpoint(&self) -> Option<&Endpoint> {
+        match self {
+            Self::Endpoint(endpoint) => Some(endpoint),
+            Self::Goal { .. } => None,
+        }
+    }
+
     /// Its centre.
     #[must_use]
     pub const fn center(&self) -> Point {

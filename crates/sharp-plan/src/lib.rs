@@ -24,6 +24,7 @@ pub mod prior;
 mod rollout;
 mod search;
 mod sharp;
+mod spare;
 mod starts;
 mod stats;
 mod task;

@@ -10,6 +10,7 @@ use sharp_space::{FootprintChecker, Heading, OccupancyGrid, Pose, Vector, trig};
 use crate::belief::Belief;
 use crate::model::Model;
 use crate::policy::{GuideView, PolarWaypoint};
+use crate::spare::Spare;
 
 /// Rays around the robot that feel for walls.
 const RAYS: usize = 12;
@@ -41,6 +42,8 @@ pub struct Workspace {
     pub checker: Arc<FootprintChecker>,
     /// The map as the simulators see it.
     pub world: Arc<World>,
+    /// Larger and clumsier robots, for whom paths are drawn first.
+    pub(crate) spares: Arc<[Spare]>,
     /// What its actions do, as policies imagine it.
     pub(crate) model: Arc<Model>,
 }
@@ -52,7 +55,8 @@ impl Workspace {
         let checker = Arc::new(FootprintChecker::new(&grid, robot.footprint));
         let world = Arc::new(World::new(&grid, robot.footprint));
         let model = Arc::new(Model::new(&robot));
-        Self { grid: Arc::new(grid), robot: Arc::new(robot), checker, world, model }
+        let spares = Spare::all(&robot, &checker).into();
+        Self { grid: Arc::new(grid), robot: Arc::new(robot), checker, world, spares, model }
     }
 }
 
@@ -136,8 +140,7 @@ impl Percept {
         let asked_m = command.speed_mps.mul_add(ActionSettings::default().action_s, 0.05);
         let now = [turn - command.bearing_rad.clamp(-1.0, 1.0), moved.norm() / asked_m];
         let felt = [0, 1].map(|i| FELT_KEPT * self.felt[i] + (1.0 - FELT_KEPT) * now[i]);
-        let belief =
-            self.belief.map(|belief| belief.after(&workspace.model, (&self.state, command), &after));
+        let belief = self.belief.map(|belief| belief.after(&workspace.model, (&self.state, command), &after));
         Self {
             state: after,
             last_displacement: [moved.x, moved.y, turn],

@@ -13,12 +13,13 @@ use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, NoGuide, pla
 use sharp_motion::Steering;
 use sharp_options::{Endpoint, OptionSet};
 use sharp_rbvd::{Rbvd, StateId};
-use sharp_space::{Cell, Heading, Point, Pose, Seed};
+use sharp_space::{Cell, CollisionChecker, Heading, Point, Pose, Seed, Stream};
 
 use crate::leg::{Leg, LegId, allowed_states, endpoints};
 use crate::percept::Workspace;
 use crate::search::{Candidate, OptionGraph};
 use crate::sharp::{Monitor, Phase};
+use crate::spare::Spare;
 
 /// Legs whose ends are further apart than this cross their interfaces at right angles, metres.
 const CROSSING_M: f64 = 1.2;
@@ -62,6 +63,8 @@ pub struct SearchSettings {
     pub cost_update: bool,
     /// Largest turn between two guides that a robot which turns in place takes in its stride, radians.
     pub smooth_turn_rad: f64,
+    /// Guides keep as much room and as wide bends as they can; false asks for no more than the robot needs.
+    pub spares: bool,
     /// How guides are planned.
     pub guide: GuideSettings,
 }
@@ -77,6 +80,7 @@ impl SearchSettings {
             cost_update: true,
             // The footprint swings out in a turn: beyond 75 degrees it needs room or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),
+            spares: true,
             guide: GuideSettings::default(),
         }
     }
@@ -176,6 +180,11 @@ impl<'a> Planner<'a> {
         }
     }
 
+    /// The leg called `id`, as it is without others, if it was guided.
+    pub(crate) fn leg_called(&self, id: LegId) -> Option<&Leg> {
+        self.guided.get(&id).and_then(|leg| leg.as_deref().ok())
+    }
+
     /// The legs that could not be guided, with the reason.
     pub fn unguided(&self) -> impl Iterator<Item = (LegId, &NoGuide)> {
         self.guided.iter().filter_map(|(&id, leg)| leg.as_ref().err().map(|reason| (id, reason)))
@@ -262,10 +271,26 @@ impl<'a> Planner<'a> {
             allowed: &allowed,
         };
         let mut rng = self.seed.stream(&format!("guide {id}"), 0);
-        let radius_m = self.workspace.robot.min_turning_radius_m();
-        let steering = if radius_m > 0.0 { Steering::Dubins { radius_m } } else { Steering::RotateTranslate };
-        let guide = plan_guide(&request, &self.workspace.checker, &steering, &self.settings.guide, &mut rng)?;
+        let spared = self.settings.spares.then(|| self.spared(&request, &mut rng)).flatten();
+        let guide = match spared {
+            Some(guide) => guide,
+            None => {
+                let steering = Steering::of(self.workspace.robot.min_turning_radius_m());
+                plan_guide(&request, &self.workspace.checker, &steering, &self.settings.guide, &mut rng)?
+            }
+        };
         Ok(Arc::new(self.leg(candidate, guide)))
+    }
+
+    /// A guide for the largest robot for which there is one.
+    fn spared(&self, request: &GuideRequest<'_>, rng: &mut Stream) -> Option<GuidePath> {
+        let settings = self.settings.guide.unsampled();
+        let stands = |spare: &&Spare| {
+            let start = request.start;
+            start.heading.is_none_or(|heading| spare.checker.is_free(Pose::at(start.position, heading)))
+        };
+        let mut spares = self.workspace.spares.iter().filter(stands);
+        spares.find_map(|spare| plan_guide(request, &spare.checker, &spare.steering, &settings, rng).ok())
     }
 
     fn leg(&self, candidate: &Candidate, guide: GuidePath) -> Leg {

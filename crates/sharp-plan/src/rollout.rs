@@ -152,10 +152,8 @@ mod tests {
         for kind in [OptionKind::Centroid, OptionKind::Interface] {
             let plan = plan(kind);
             let legs = &plan.solution.legs;
-            let drivers: Vec<Driver<'_>> = legs
-                .iter()
-                .map(|planned| Driver::new(&planned.leg, &planned.learnt.policy, None))
-                .collect();
+            let drivers: Vec<Driver<'_>> =
+                legs.iter().map(|planned| Driver::new(&planned.leg, &planned.learnt.policy, None)).collect();
             let start = RobotState::at_rest(plan.solution.query.start);
             let mut vehicle = crate::learn::kinematic_vehicle(&plan.workspace, &NoiseModel::none(), true);
             vehicle.reset(start, Seed(1), 0);

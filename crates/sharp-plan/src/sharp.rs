@@ -1,5 +1,6 @@
 //! Algorithm 1: from an abstraction and a problem to a policy composed of options.
 
+mod joining;
 mod learning;
 mod repair;
 
@@ -27,7 +28,7 @@ const START_POOL: usize = 256;
 /// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
 /// Plans run from end to end before the best of them is taken.
-const VERIFIED_MAX: usize = 3;
+const VERIFIED_MAX: usize = 4;
 
 /// All settings of [`solve`].
 #[derive(Clone, Debug)]
@@ -46,6 +47,8 @@ pub struct SolveSettings {
     pub wanted_success: f64,
     /// Fresh runs through the whole plan that its predicted success is counted on.
     pub verify_episodes: u32,
+    /// Smooths the guides of a plan together; false is the paper's rule.
+    pub join_guides: bool,
     /// A leg that holds less often than this makes the search look for a better way.
     pub usable_success: f64,
     /// The root of all randomness.
@@ -59,6 +62,7 @@ impl SolveSettings {
         let mut search = SearchSettings::new(workspace);
         if mode == LearningMode::Paper {
             search.untrained_surcharge_s = 0.0;
+            search.spares = false;
         }
         Self {
             learn: LearnSettings::new(mode),
@@ -69,6 +73,7 @@ impl SolveSettings {
             repair_rounds: if mode == LearningMode::Fast { 3 } else { 0 },
             wanted_success: 0.99,
             verify_episodes: 1000,
+            join_guides: mode != LearningMode::Paper,
             // The paper keeps whatever was learnt.
             usable_success: if mode == LearningMode::Paper { 0.0 } else { 0.9 },
             seed,
@@ -150,6 +155,11 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Seconds per success, and a price for each failure.
+    fn cost_s(&self) -> f64 {
+        Certificate { tally: self.predicted, mean_time_s: self.predicted_time_s }.cost_s()
+    }
+
     /// Option uses and how many of them found their policy in the library.
     #[must_use]
     pub fn reuse(&self) -> (usize, usize) {
@@ -235,6 +245,7 @@ impl Run<'_> {
         let mut verified = 0;
         for _ in 0..ATTEMPTS_MAX {
             let Some(legs) = self.search() else { break };
+            let legs = self.join(legs);
             if self.monitor.should_stop() || !self.learn_missing(&legs)? {
                 return Ok(Outcome::Stopped);
             }
@@ -245,18 +256,15 @@ impl Run<'_> {
             }
             let Some(solution) = self.verify(&legs)? else { return Ok(Outcome::Stopped) };
             verified += 1;
-            let mut falls_short = false;
-            for planned in &solution.legs {
-                if self.falls_short(planned.on_arrival) {
-                    falls_short = true;
-                    self.observed.insert(planned.leg.id, planned.on_arrival);
-                }
+            let is_weak = self.is_weak(&solution);
+            if is_weak {
+                let arrivals = solution.legs.iter().map(|planned| (planned.leg.id, planned.on_arrival));
+                self.observed.extend(arrivals.filter(|(_, tally)| tally.episodes > 0));
             }
-            let is_better = |best: &Solution| solution.predicted.successes > best.predicted.successes;
-            if best.as_ref().is_none_or(is_better) {
+            if best.as_ref().is_none_or(|best| solution.cost_s() < best.cost_s()) {
                 best = Some(solution);
             }
-            if !falls_short
+            if !is_weak
                 || verified == VERIFIED_MAX
                 || self.search().is_none_or(|again| ids(&again) == ids(&legs))
             {
@@ -282,8 +290,26 @@ impl Run<'_> {
         planner.plan(&cost, *monitor)
     }
 
+    /// `legs` with guides that join smoothly, unless the paper's way is wanted.
+    fn join(&self, legs: Vec<Arc<Leg>>) -> Vec<Arc<Leg>> {
+        if !self.settings.join_guides {
+            return legs;
+        }
+        joining::join_guides(self.workspace, &self.query, legs, &self.settings.search.guide)
+    }
+
     fn falls_short(&self, tally: Tally) -> bool {
         tally.episodes > 0 && tally.rate() < self.settings.usable_success
+    }
+
+    /// Returns true if another way may be better than `solution`.
+    fn is_weak(&self, solution: &Solution) -> bool {
+        let wanted = if self.settings.repair_rounds > 0 {
+            self.settings.wanted_success
+        } else {
+            self.settings.usable_success
+        };
+        solution.predicted.rate() < wanted
     }
 
     /// Repairs the plan of `legs` and counts how often it holds; `None` if stopped.

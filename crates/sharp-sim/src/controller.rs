@@ -81,7 +81,11 @@ impl WaypointController {
                 if saturates || aim.speed_mps <= 0.0 { 0.0 } else { BEARING_GAIN_PS / self.yaw_gain }
             }
             (Drive::Ackermann { wheelbase_m, max_steer_rad, .. }, Command::Steer { steer_rad, .. }) => {
-                if steer_rad.abs() >= max_steer_rad { 0.0 } else { pursuit_slope(target, wheelbase_m) }
+                if steer_rad.abs() >= max_steer_rad {
+                    0.0
+                } else {
+                    pursuit_slope(target, wheelbase_m)
+                }
             }
             _ => 0.0,
         };

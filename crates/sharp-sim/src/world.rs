@@ -36,7 +36,7 @@ impl World {
 
     /// Where the grid lies in the world.
     #[must_use]
-    pub const fn frame(&self) -> &GridFrame {
+    pub fn frame(&self) -> &GridFrame {
         self.checker.field().frame()
     }
 
@@ -48,7 +48,7 @@ impl World {
 
     /// The distance field of the map.
     #[must_use]
-    pub const fn field(&self) -> &DistanceField {
+    pub fn field(&self) -> &DistanceField {
         self.checker.field()
     }
 

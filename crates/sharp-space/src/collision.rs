@@ -1,5 +1,7 @@
 //! The collision function f : X → {0, 1} of the paper, turned around: where the robot may stand.
 
+use std::sync::Arc;
+
 use crate::distance_field::DistanceField;
 use crate::footprint::Footprint;
 use crate::grid::{GridFrame, OccupancyGrid};
@@ -35,9 +37,9 @@ impl<C: CollisionChecker + ?Sized> CollisionChecker for &C {
 #[derive(Clone, Debug)]
 pub struct FootprintChecker {
     footprint: Footprint,
-    field: DistanceField,
+    field: Arc<DistanceField>,
     /// `width + 1` counts a row: blocked cells left of each column border.
-    blocked_before: Vec<u32>,
+    blocked_before: Arc<[u32]>,
 }
 
 impl FootprintChecker {
@@ -54,7 +56,14 @@ impl FootprintChecker {
                 blocked_before.push(count);
             }
         }
-        Self { footprint, field: DistanceField::new(grid), blocked_before }
+        let field = Arc::new(DistanceField::new(grid));
+        Self { footprint, field, blocked_before: blocked_before.into() }
+    }
+
+    /// A checker for another outline in the same map; the two share what they know of it.
+    #[must_use]
+    pub fn with_footprint(&self, footprint: Footprint) -> Self {
+        Self { footprint, field: Arc::clone(&self.field), blocked_before: Arc::clone(&self.blocked_before) }
     }
 
     /// The outline it tests.
@@ -65,7 +74,7 @@ impl FootprintChecker {
 
     /// The distance field of the grid it tests against.
     #[must_use]
-    pub const fn field(&self) -> &DistanceField {
+    pub fn field(&self) -> &DistanceField {
         &self.field
     }
 

@@ -4,14 +4,15 @@
 //! and bends; where it cannot, hybrid A* searches.
 
 use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, plan_guide};
-use sharp_motion::{Budget, HybridSettings, Path, RrtSettings, Steering, hybrid_astar};
+use sharp_motion::{HybridSettings, Path, Steering, hybrid_astar};
 use sharp_sim::RobotState;
-use sharp_space::{CollisionChecker, Footprint, FootprintChecker, Heading, Point, Pose, Seed};
+use sharp_space::{CollisionChecker, Heading, Point, Pose, Seed};
 
 use crate::baseline::{Readiness, Situation, nominal_time_s};
 use crate::pace::SpeedRule;
 use crate::percept::{Tracker, Workspace};
 use crate::planner::Query;
+use crate::spare::Spare;
 
 /// A robot further off its path than this gets a new one, metres.
 const OFF_ROUTE_M: f64 = 0.5;
@@ -20,10 +21,6 @@ const STILL_ACTIONS: u32 = 6;
 /// A robot that moved less than this and turned less than [`STILL_TURN_RAD`] stands still, metres.
 const STILL_M: f64 = 0.15;
 const STILL_TURN_RAD: f64 = 0.3;
-/// What is tried in turn: metres added to the outline on each side, and the turning radius in units of
-/// the robot's own. A car that slips cannot follow its tightest bend.
-const SPARES: [(f64, f64); 7] =
-    [(0.10, 2.5), (0.10, 2.0), (0.10, 1.5), (0.06, 1.5), (0.06, 1.25), (0.03, 1.25), (0.0, 1.0)];
 /// Actions between two plans: what a new path needs to show its worth.
 const PATIENCE_ACTIONS: u32 = 6;
 
@@ -31,27 +28,13 @@ const PATIENCE_ACTIONS: u32 = 6;
 #[derive(Clone, Debug)]
 pub struct RoutePlanner<'a> {
     workspace: &'a Workspace,
-    attempts: Vec<Attempt>,
-}
-
-/// An outline and a turning radius with something to spare.
-#[derive(Clone, Debug)]
-pub(crate) struct Attempt {
-    pub(crate) checker: FootprintChecker,
-    pub(crate) steering: Steering,
 }
 
 impl<'a> RoutePlanner<'a> {
     /// A planner for the robot and the map of `workspace`.
     #[must_use]
     pub fn new(workspace: &'a Workspace) -> Self {
-        let mut spares = SPARES.to_vec();
-        if workspace.robot.can_turn_in_place() {
-            spares.dedup_by_key(|spare| spare.0);
-        }
-        let attempts =
-            spares.iter().map(|&(margin_m, bend)| Attempt::new(workspace, margin_m, bend)).collect();
-        Self { workspace, attempts }
+        Self { workspace }
     }
 
     /// A drivable path from `query`'s start to its goal's position, or `None` where there is none.
@@ -59,47 +42,33 @@ impl<'a> RoutePlanner<'a> {
     pub fn plan(&self, query: &Query) -> Option<GuidePath> {
         let goal_radius_m = 0.5 * self.workspace.robot.goal_tolerance_m;
         self.attempts(query.start)
-            .find_map(|attempt| attempt.ridge(query).or_else(|| attempt.searched(query, goal_radius_m)))
+            .find_map(|spare| ridge(spare, query).or_else(|| searched(spare, query, goal_radius_m)))
     }
 
     /// What a robot at `start` has the room to spare for, the most first.
-    pub(crate) fn attempts(&self, start: Pose) -> impl Iterator<Item = &Attempt> {
-        self.attempts.iter().filter(move |attempt| attempt.checker.is_free(start))
+    pub(crate) fn attempts(&self, start: Pose) -> impl Iterator<Item = &Spare> {
+        self.workspace.spares.iter().filter(move |spare| spare.checker.is_free(start))
     }
 }
 
-impl Attempt {
-    fn new(workspace: &Workspace, margin_m: f64, bend: f64) -> Self {
-        let footprint = &workspace.robot.footprint;
-        let (length_m, width_m) = (footprint.half_length_m() + margin_m, footprint.half_width_m() + margin_m);
-        let outline = Footprint::rectangle(length_m, width_m).unwrap_or(*footprint);
-        Self {
-            checker: FootprintChecker::new(&workspace.grid, outline),
-            steering: Steering::of(bend * workspace.robot.min_turning_radius_m()),
-        }
-    }
+/// Along the ridge of clearance.
+fn ridge(spare: &Spare, query: &Query) -> Option<GuidePath> {
+    let request = GuideRequest {
+        start: GuideEnd { position: query.start.position, heading: Some(query.start.heading) },
+        goal: GuideEnd { position: query.goal.position, heading: None },
+        allowed: &|_| true,
+    };
+    // No sampling: hybrid A* finds shorter paths, and finds them always.
+    let unused = &mut Seed(0).stream("route", 0);
+    plan_guide(&request, &spare.checker, &spare.steering, &GuideSettings::default().unsampled(), unused).ok()
+}
 
-    /// Along the ridge of clearance.
-    fn ridge(&self, query: &Query) -> Option<GuidePath> {
-        let request = GuideRequest {
-            start: GuideEnd { position: query.start.position, heading: Some(query.start.heading) },
-            goal: GuideEnd { position: query.goal.position, heading: None },
-            allowed: &|_| true,
-        };
-        // No sampling: hybrid A* finds shorter paths, and finds them always.
-        let sampling = RrtSettings { budget: Budget { iterations: 0 }, ..RrtSettings::default() };
-        let settings = GuideSettings { sampling, seeds: 0, ..GuideSettings::default() };
-        let unused = &mut Seed(0).stream("route", 0);
-        plan_guide(&request, &self.checker, &self.steering, &settings, unused).ok()
-    }
-
-    /// By hybrid A*.
-    fn searched(&self, query: &Query, goal_radius_m: f64) -> Option<GuidePath> {
-        let settings = HybridSettings { goal_radius_m, ..HybridSettings::default() };
-        let query = sharp_motion::Query { start: query.start, goal: query.goal };
-        let path = hybrid_astar(&query, &self.checker, &self.steering, &settings).path()?;
-        as_guide(&path, &self.steering)
-    }
+/// By hybrid A*.
+fn searched(spare: &Spare, query: &Query, goal_radius_m: f64) -> Option<GuidePath> {
+    let settings = HybridSettings { goal_radius_m, ..HybridSettings::default() };
+    let query = sharp_motion::Query { start: query.start, goal: query.goal };
+    let path = hybrid_astar(&query, &spare.checker, &spare.steering, &settings).path()?;
+    as_guide(&path, &spare.steering)
 }
 
 /// The path as a guide: a car's with its headings; otherwise the corners at which the robot turns in

@@ -8,11 +8,12 @@ use sharp_motion::{Path, RrtSettings, ShortcutSettings, Uniform, rrt, shortcut};
 use sharp_sim::{ActionSettings, RobotState};
 use sharp_space::{CollisionChecker, FootprintChecker, Heading, Point, Pose, Seed, Vector};
 
-use crate::baseline::route::{Attempt, RoutePlanner};
+use crate::baseline::route::RoutePlanner;
 use crate::baseline::{Baseline, Pilot, Readiness, Situation, nominal_time_s};
 use crate::percept::Workspace;
 use crate::planner::Query;
 use crate::policy::PolarWaypoint;
+use crate::spare::Spare;
 
 /// Distance of the points that the robot is sent to, metres: the farthest that an action may aim at.
 const SPACING_M: f64 = 0.5;
@@ -118,7 +119,7 @@ impl RrtPilot<'_> {
         let mut sampler = Uniform { bounds: workspace.grid.frame().bounds() };
         let mut rng = self.seed.stream("plan", self.plans);
         self.plans += 1;
-        let path = planner.attempts(start).find_map(|Attempt { checker, steering }| {
+        let path = planner.attempts(start).find_map(|Spare { checker, steering }| {
             let query = sharp_motion::Query { goal: fitting(checker, query.goal)?, ..query };
             let path = rrt(&query, checker, steering, &mut sampler, settings, &mut rng).path()?;
             Some(shortcut(&path, checker, steering, &ShortcutSettings::default(), &mut rng))

@@ -62,7 +62,8 @@ impl Course {
         let trial = Trial { workspace: &self.workspace, noise, episodes, seed };
         let next = |index: usize| self.legs.get(index + 1).map(AsRef::as_ref);
         let legs = self.legs.iter().zip(&self.starts).enumerate();
-        legs.map(|(index, (leg, starts))| trial.of_leg(&Driver::new(leg, policy, next(index)), starts)).collect()
+        legs.map(|(index, (leg, starts))| trial.of_leg(&Driver::new(leg, policy, next(index)), starts))
+            .collect()
     }
 }
 

@@ -88,7 +88,8 @@ impl Run<'_> {
         if self.learnt.contains_key(&leg.id) || leg.id.role() != Role::Option {
             return Ok(());
         }
-        if let Some(stored) = self.library.adopt(&leg.corridor(&self.workspace.grid)) {
+        let alone = self.planner.leg_called(leg.id).unwrap_or(leg);
+        if let Some(stored) = self.library.adopt(&alone.corridor(&self.workspace.grid)) {
             self.before.push(leg.id);
             self.keep(leg, stored.learnt)?;
         }
@@ -98,8 +99,10 @@ impl Run<'_> {
     /// Keeps what was learnt of `leg`, an option in the library as well.
     pub(super) fn keep(&mut self, leg: &Leg, learnt: Learnt) -> Result<(), FileError> {
         if let (LegId::Option(id), true) = (leg.id, learnt.verified.successes > 0) {
-            let corridor = leg.corridor(&self.workspace.grid);
-            let stored = StoredOption { guide: leg.guide.clone(), learnt: learnt.clone(), corridor };
+            // The leg of a plan may have been joined to its neighbours.
+            let alone = self.planner.leg_called(leg.id).unwrap_or(leg);
+            let corridor = alone.corridor(&self.workspace.grid);
+            let stored = StoredOption { guide: alone.guide.clone(), learnt: learnt.clone(), corridor };
             self.library.insert(id, stored)?;
         }
         self.learnt.insert(leg.id, learnt);

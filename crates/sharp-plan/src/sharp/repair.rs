@@ -16,8 +16,6 @@ use crate::prior::Prior;
 use crate::rollout::{ChainRun, Driver};
 use crate::stats::Tally;
 
-/// A leg that holds as often as this on arrival is not trained anew, only chosen anew.
-const TRAIN_BELOW: f64 = 0.97;
 /// Way after a repaired leg that judges how it arrives, metres.
 const TAIL_M: f64 = 4.0;
 /// A plan that holds less often than this may be better off with one policy for all of its new legs.
@@ -138,7 +136,7 @@ impl Run<'_> {
         let starts = self.starts(leg, seed).with_arrivals(arrivals(runs, index));
         let mut settings = LearnSettings { wanted_success: wanted, ..self.settings.learn.clone() };
         // Training is for legs that are weak themselves, and once only.
-        if self.learnt[&leg.id].gradient_steps > 0 || on_arrival.rate() >= TRAIN_BELOW {
+        if self.learnt[&leg.id].gradient_steps > 0 || on_arrival.rate() >= settings.train_below {
             settings.train_below = 0.0;
         }
         let drivers = self.drivers(legs);
