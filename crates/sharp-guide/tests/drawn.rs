@@ -2,7 +2,7 @@
 
 use sharp_guide::{
     Abstraction, GuideEnd, GuidePath, GuideRequest, GuideSettings, NoGuide, OptionGuide, Place, Robot,
-    Steering, plan_guide,
+    Steering, plan_guide, smooth_guide,
 };
 use sharp_options::{AllowedRule, OptionKind, OptionSet, OptionSettings};
 use sharp_rbvd::{Rbvd, RbvdSettings};
@@ -46,6 +46,16 @@ fn end(x: f64, y: f64) -> GuideEnd {
 
 fn grid(drawing: &str) -> OccupancyGrid {
     OccupancyGrid::from_ascii(0.2, drawing).expect("a sound drawing")
+}
+
+/// The [`DOOR`], closed.
+fn grid_with_wall() -> OccupancyGrid {
+    grid(
+        &DOOR.replace(
+            "#.......................................#",
+            "#...................#...................#",
+        ),
+    )
 }
 
 fn plan(drawing: &str, start: GuideEnd, goal: GuideEnd, steering: &Steering) -> Result<GuidePath, NoGuide> {
@@ -97,6 +107,34 @@ fn a_car_that_looks_away_turns_round_first() {
     let guide = plan(DOOR, start, end(7.0, 1.9), &LIMO).expect("there is room for a loop");
     assert!(guide.start().heading.turn_to(Heading::new(3.1)).abs() < 0.6, "{:?}", guide.start());
     assert!(guide.length_m() > 5.5, "only {} m with a loop", guide.length_m());
+}
+
+#[test]
+fn a_way_of_ones_own_becomes_smooth_and_keeps_to_its_discs() {
+    let grid = grid(DOOR);
+    let checker = FootprintChecker::new(&grid, husky());
+    let way = [(1.2, 1.0), (2.6, 3.0), (4.1, 1.9), (7.0, 1.9)].map(|(x, y)| Point::new(x, y));
+    let (start, goal) = (end(1.2, 1.0), end(7.0, 1.9));
+    let request = GuideRequest { start, goal, allowed: &|_| true };
+    let smooth = |discs: &[(Point, f64)]| {
+        smooth_guide((&way, discs), &request, &checker, &HUSKY, &GuideSettings::default())
+    };
+    let off_m = |guide: &GuidePath| {
+        guide.poses().iter().map(|pose| (pose.position - way[1]).norm()).fold(f64::INFINITY, f64::min)
+    };
+    let (free, held) = (smooth(&[]).expect("a room"), smooth(&[(way[1], 0.2)]).expect("a room"));
+    assert!(off_m(&free) > 0.4, "the corner is cut: {} m", off_m(&free));
+    assert!(off_m(&held) < 0.35, "the disc is missed by {} m", off_m(&held) - 0.2);
+    for guide in [&free, &held] {
+        let bends = guide.poses().windows(2).map(|pair| pair[0].heading.turn_to(pair[1].heading).abs());
+        let worst_rad = bends.fold(0.0, f64::max);
+        assert!(worst_rad < 0.6, "a kink of {worst_rad} rad");
+    }
+    let through_wall = [start.position, goal.position];
+    let blocked = grid_with_wall();
+    let walled = FootprintChecker::new(&blocked, husky());
+    let refused = smooth_guide((&through_wall, &[]), &request, &walled, &HUSKY, &GuideSettings::default());
+    assert!(matches!(refused, Err(NoGuide::Footprint(_))), "{refused:?}");
 }
 
 #[test]

@@ -142,3 +142,42 @@ impl Trial<'_> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::{HALL, along, followed, legs, world};
+
+    #[test]
+    fn a_trial_gives_up_once_too_many_have_failed() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let leg = &legs(&workspace, &abstraction, along())[1];
+        let policy = followed(&workspace).policy;
+        let (noise, seed) = (NoiseModel::harsh().scaled(2.0), Seed(1));
+        let trial = Trial { workspace: &workspace, noise: &noise, episodes: 300, seed };
+        let starts = Starts::exactly(RobotState::at_rest(leg.guide.start()));
+        let drivers = [Driver::new(leg, &policy, None)];
+        let all = trial.of_legs(&drivers, &starts);
+        let failures = all.tally.failures();
+        assert!((20..280).contains(&failures), "not a trial that fails at times: {all:?}");
+        assert_eq!(trial.of_legs_while(&drivers, &starts, failures), all, "as many were allowed");
+        let early = trial.of_legs_while(&drivers, &starts, 0).tally;
+        assert_eq!(early.episodes, BLOCK, "the first block told");
+    }
+
+    #[test]
+    fn a_driver_may_be_judged_by_the_first_metres_alone() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let leg = &legs(&workspace, &abstraction, along())[1];
+        let policy = followed(&workspace).policy;
+        let noise = NoiseModel::none();
+        let trial = Trial { workspace: &workspace, noise: &noise, episodes: 4, seed: Seed(1) };
+        let starts = Starts::exactly(RobotState::at_rest(leg.guide.start()));
+        let whole = Driver::new(leg, &policy, None);
+        let part = Driver { until_m: 0.5 * leg.guide.length_m(), ..whole };
+        let times_s = [whole, part].map(|driver| trial.of_leg(&driver, &starts).mean_time_s);
+        assert!((0.35..0.65).contains(&(times_s[1] / times_s[0])), "half the way took {times_s:?}");
+    }
+}

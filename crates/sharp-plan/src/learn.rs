@@ -23,7 +23,7 @@ use crate::stats::Tally;
 use crate::task::LegTask;
 
 /// Rounds in which candidates are compared: the share of [`LearnSettings::screening_episodes`] that each
-/// drives, and how many go on. Those that the last round leaves are certified.
+/// drives, and how many go on. Those that the last round leaves are compared in full.
 const ROUNDS: [(f64, usize); 3] = [(0.1, 10), (0.3, 5), (1.0, 3)];
 /// Reward of a contact while a prior is trained on: what it was trained with at full caution.
 const FINE_CONTACT: f64 = -20.0;
@@ -338,24 +338,12 @@ impl Lesson<'_> {
         self.learnt(policy, judged, (0, 0))
     }
 
-    /// What drives without learning: the few that cost least, each round on more episodes than the one
-    /// before it.
+    /// What drives without learning: the few that cost least.
     fn screen(&self) -> Vec<OptionPolicy> {
-        let robot = &self.workspace.robot;
-        let mut left: Vec<OptionPolicy> =
-            Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
-        left.extend(PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced));
-        left.extend(Prior::shipped(robot).candidates(robot, self.noise));
-        for (round, (share, keep)) in ROUNDS.into_iter().enumerate() {
-            let episodes = (share * f64::from(self.settings.screening_episodes)).ceil() as u32;
-            let trial = self.trial(episodes, "screen", round as u64);
-            let cost_s = |policy: &OptionPolicy| trial.of_legs(&self.drivers(policy), &self.starts).cost_s();
-            let mut costs: Vec<(f64, OptionPolicy)> =
-                left.into_iter().map(|policy| (cost_s(&policy), policy)).collect();
-            costs.sort_by(|a, b| a.0.total_cmp(&b.0));
-            left = costs.into_iter().take(keep).map(|(_, policy)| policy).collect();
-        }
-        left
+        screen(self.workspace, self.noise, self.settings.screening_episodes, |policy, episodes, round| {
+            let trial = self.trial(episodes, "screen", round);
+            trial.of_legs(&self.drivers(policy), &self.starts).cost_s()
+        })
     }
 
     /// The prior, trained further on this leg alone.
@@ -409,6 +397,29 @@ impl Lesson<'_> {
 fn learnt(policy: OptionPolicy, certificate: Certificate, (env_steps, gradient_steps): (u64, u64)) -> Learnt {
     let Certificate { tally, mean_time_s } = certificate;
     Learnt { policy, verified: tally, mean_time_s, env_steps, gradient_steps }
+}
+
+/// All policies that drive without learning on the map, and of them the few that cost least: each round
+/// compares fewer on more episodes. `cost_s` drives a policy for so many episodes of one round.
+pub(crate) fn screen(
+    workspace: &Workspace,
+    noise: &NoiseModel,
+    episodes: u32,
+    cost_s: impl Fn(&OptionPolicy, u32, u64) -> f64,
+) -> Vec<OptionPolicy> {
+    let robot = &workspace.robot;
+    let mut left: Vec<OptionPolicy> =
+        Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
+    left.extend(PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced));
+    left.extend(Prior::shipped(robot).candidates(robot, noise));
+    for (round, (share, keep)) in (0..).zip(ROUNDS) {
+        let episodes = (share * f64::from(episodes)).ceil() as u32;
+        let mut costs: Vec<(f64, OptionPolicy)> =
+            left.into_iter().map(|policy| (cost_s(&policy, episodes, round), policy)).collect();
+        costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        left = costs.into_iter().take(keep).map(|(_, policy)| policy).collect();
+    }
+    left
 }
 
 #[cfg(test)]

@@ -75,8 +75,8 @@ impl SearchSettings {
     pub fn new(workspace: &Workspace) -> Self {
         Self {
             nominal_speed_mps: 0.5 * workspace.robot.max_speed_mps,
-            untrained_surcharge_s: 2.0,
-            shortcut_surcharge_s: 6.0,
+            untrained_surcharge_s: 8.0,
+            shortcut_surcharge_s: 14.0,
             cost_update: true,
             // The footprint swings out in a turn: beyond 75 degrees it needs room or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),

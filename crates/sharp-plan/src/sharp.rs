@@ -49,6 +49,8 @@ pub struct SolveSettings {
     pub verify_episodes: u32,
     /// Smooths the guides of a plan together; false is the paper's rule.
     pub join_guides: bool,
+    /// A plan that holds less often than this makes the search try other ways.
+    pub retry_below: f64,
     /// A leg that holds less often than this makes the search look for a better way.
     pub usable_success: f64,
     /// The root of all randomness.
@@ -74,6 +76,7 @@ impl SolveSettings {
             wanted_success: 0.99,
             verify_episodes: 1000,
             join_guides: mode != LearningMode::Paper,
+            retry_below: if mode == LearningMode::Fast { 0.97 } else { 0.0 },
             // The paper keeps whatever was learnt.
             usable_success: if mode == LearningMode::Paper { 0.0 } else { 0.9 },
             seed,
@@ -304,12 +307,7 @@ impl Run<'_> {
 
     /// Returns true if another way may be better than `solution`.
     fn is_weak(&self, solution: &Solution) -> bool {
-        let wanted = if self.settings.repair_rounds > 0 {
-            self.settings.wanted_success
-        } else {
-            self.settings.usable_success
-        };
-        solution.predicted.rate() < wanted
+        solution.predicted.rate() < self.settings.retry_below
     }
 
     /// Repairs the plan of `legs` and counts how often it holds; `None` if stopped.

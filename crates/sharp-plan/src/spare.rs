@@ -33,3 +33,27 @@ impl Spare {
         spares.iter().map(of).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::{HALL, world};
+
+    #[test]
+    fn the_most_to_spare_comes_first_and_the_robot_itself_last() {
+        let (workspace, _) = world(HALL, OptionKind::Centroid);
+        for robot in [RobotModel::husky(), RobotModel::limo()] {
+            let checker = workspace.checker.with_footprint(robot.footprint);
+            let spares = Spare::all(&robot, &checker);
+            let widths_m: Vec<f64> =
+                spares.iter().map(|spare| spare.checker.footprint().half_width_m()).collect();
+            assert!(widths_m.is_sorted_by(|a, b| a >= b), "{}: {widths_m:?}", robot.name);
+            let last = &spares[spares.len() - 1];
+            assert_eq!(*last.checker.footprint(), robot.footprint, "{}", robot.name);
+            assert_eq!(last.steering, Steering::of(robot.min_turning_radius_m()), "{}", robot.name);
+            assert_eq!(spares.len(), if robot.can_turn_in_place() { 4 } else { 7 }, "{}", robot.name);
+        }
+    }
+}

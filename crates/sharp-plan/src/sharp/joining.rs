@@ -102,3 +102,59 @@ fn piece(path: &GuidePath, from_m: f64, to_m: f64, spacing_m: f64) -> Option<Gui
     let pose = |i: usize| path.pose_at(from_m + (to_m - from_m) * i as f64 / count);
     GuidePath::new((0..=count as usize).map(pose).collect(), spacing_m).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::drawn::{HALL, RING, along, legs, world};
+
+    const AROUND: [(f64, f64); 2] = [(1.4, 1.2), (8.6, 4.8)];
+
+    fn around() -> Query {
+        let [start, goal] = AROUND;
+        Query { start: Pose::new(start.0, start.1, 0.0), goal: Pose::new(goal.0, goal.1, 0.0) }
+    }
+
+    /// The largest turn from one pose to the next along all guides, radians.
+    fn sharpest_rad(legs: &[Arc<Leg>]) -> f64 {
+        let poses: Vec<&Pose> = legs.iter().flat_map(|leg| leg.guide.poses()).collect();
+        let turns = poses.windows(2).map(|pair| pair[0].heading.turn_to(pair[1].heading).abs());
+        turns.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn joined_guides_meet_in_the_sets_and_bend_less() {
+        for (drawing, query) in [(HALL, along()), (RING, around())] {
+            for kind in [OptionKind::Centroid, OptionKind::Interface] {
+                let (workspace, abstraction) = world(drawing, kind);
+                let alone = legs(&workspace, &abstraction, query);
+                let joined = join_guides(&workspace, &query, alone.clone(), &GuideSettings::default());
+                for pair in joined.windows(2) {
+                    let (end, start) = (pair[0].guide.end(), pair[1].guide.start());
+                    let name = format!("{kind:?}, {} to {}", pair[0].id, pair[1].id);
+                    assert!(end.distance_m(&start) < 1e-9, "{name}: a gap");
+                    assert!(end.heading.turn_to(start.heading).abs() < 1e-9, "{name}: a kink");
+                    assert!(pair[0].is_done(&end), "{name}: the path misses the set");
+                }
+                let (before, after) = (sharpest_rad(&alone), sharpest_rad(&joined));
+                assert!(after <= before + 0.05, "{kind:?}: {after} rad at once instead of {before}");
+                assert!(joined.iter().all(|leg| leg.guide.length_m() >= LEG_MIN_M), "{kind:?}: a stump");
+            }
+        }
+    }
+
+    #[test]
+    fn a_path_that_cannot_meet_a_set_leaves_the_guides_alone() {
+        let (workspace, abstraction) = world(HALL, OptionKind::Centroid);
+        let alone = legs(&workspace, &abstraction, along());
+        // Backwards, the sets come in the wrong order.
+        let backwards: Vec<Arc<Leg>> = alone.iter().rev().cloned().collect();
+        let joined = join_guides(&workspace, &along(), backwards.clone(), &GuideSettings::default());
+        let guides = |legs: &[Arc<Leg>]| legs.iter().map(|leg| leg.guide.clone()).collect::<Vec<_>>();
+        assert_eq!(guides(&joined), guides(&backwards));
+        let single = join_guides(&workspace, &along(), alone[..1].to_vec(), &GuideSettings::default());
+        assert_eq!(guides(&single), guides(&alone[..1]), "one leg has nothing to join");
+    }
+}

@@ -8,18 +8,16 @@ use sharp_sim::RobotState;
 use super::{LegMonitor, Run, certificate, tallies};
 use crate::certify::Certificate;
 use crate::files::FileError;
-use crate::learn::{LearnSettings, Learnt, Lesson};
+use crate::learn::{LearnSettings, Learnt, Lesson, screen};
 use crate::leg::Leg;
-use crate::pace::PacedFollower;
 use crate::policy::OptionPolicy;
-use crate::prior::Prior;
 use crate::rollout::{ChainRun, Driver};
 use crate::stats::Tally;
 
 /// Way after a repaired leg that judges how it arrives, metres.
 const TAIL_M: f64 = 4.0;
-/// A plan that holds less often than this may be better off with one policy for all of its new legs.
-const RIVALS_BELOW: f64 = 0.95;
+/// Names the random stream of the runs that repairs are judged by.
+const REPAIR: &str = "repair";
 /// Gain below which a repaired policy counts as no better, share of episodes: luck explains less.
 const GAIN_MIN: f64 = 0.003;
 
@@ -32,18 +30,17 @@ impl Run<'_> {
             if self.monitor.should_stop() {
                 return Ok(false);
             }
-            let tally = certificate(&runs).tally;
-            if tally.rate() >= self.settings.wanted_success {
+            if certificate(&runs).tally.rate() >= self.settings.wanted_success {
                 break;
             }
             let before: Vec<Learnt> = legs.iter().map(|leg| self.learnt[&leg.id].clone()).collect();
-            let changed = (round == 0 && tally.rate() < RIVALS_BELOW && self.try_rivals(legs, &runs)?)
+            let changed = round == 0 && self.try_together(legs, &runs)?
                 || self.relearn_weak(legs, &runs, u64::from(round))?;
             if !changed {
                 break;
             }
             let anew = self.run_plan(legs);
-            if certificate(&anew).tally.successes <= tally.successes {
+            if certificate(&anew).cost_s() >= certificate(&runs).cost_s() {
                 for (leg, learnt) in legs.iter().zip(before) {
                     self.keep(leg, learnt)?;
                 }
@@ -56,40 +53,41 @@ impl Run<'_> {
 
     /// The runs that repairs are judged by: always the same episodes.
     fn run_plan(&self, legs: &[Arc<Leg>]) -> Vec<ChainRun> {
-        self.run_chain(&self.drivers(legs), self.settings.repair_episodes, "repair")
+        self.run_chain(&self.drivers(legs), self.settings.repair_episodes, REPAIR)
     }
 
     /// Gives all legs that were learnt in this problem one and the same policy if the plan is better off:
-    /// each may have been chosen well for itself and badly for the next. Returns true if it is.
-    fn try_rivals(&mut self, legs: &[Arc<Leg>], runs: &[ChainRun]) -> Result<bool, FileError> {
-        let (robot, noise) = (&self.workspace.robot, &self.settings.noise);
-        let is_new: Vec<bool> = legs.iter().map(|leg| !self.before.contains(&leg.id)).collect();
-        let mut best = (certificate(runs).cost_s(), None);
-        let mut rivals = Prior::shipped(robot).candidates(robot, noise);
-        rivals.push(OptionPolicy::Paced(PacedFollower::tuned(robot, noise)));
-        for rival in rivals {
+    /// what suits each leg best may hand over badly to the next. Returns true if it is.
+    fn try_together(&mut self, legs: &[Arc<Leg>], runs: &[ChainRun]) -> Result<bool, FileError> {
+        let new: Vec<usize> =
+            (0..legs.len()).filter(|&index| !self.before.contains(&legs[index].id)).collect();
+        let drive = |policy: &OptionPolicy, episodes, purpose: &str| {
             let mut drivers = self.drivers(legs);
-            for (driver, _) in drivers.iter_mut().zip(&is_new).filter(|(_, is_new)| **is_new) {
-                driver.policy = &rival;
+            for &index in &new {
+                drivers[index].policy = policy;
             }
-            let driven = self.run_chain(&drivers, self.settings.repair_episodes, "repair");
-            let cost_s = certificate(&driven).cost_s();
-            if cost_s < best.0 {
-                best = (cost_s, Some((rival, driven)));
-            }
-        }
-        let Some((rival, driven)) = best.1 else { return Ok(false) };
-        let certify = |index: usize| {
-            let seed = self.settings.seed.child(&format!("rival {}", legs[index].id), 0);
-            let starts = self.starts(&legs[index], seed).with_arrivals(arrivals(&driven, index));
-            let lesson = self.lesson(&legs[index], starts, seed);
-            let Certificate { tally, mean_time_s } =
-                Lesson { next: legs.get(index + 1), ..lesson }.certify(&rival);
-            let Learnt { env_steps, gradient_steps, .. } = self.learnt[&legs[index].id];
-            Learnt { policy: rival.clone(), verified: tally, mean_time_s, env_steps, gradient_steps }
+            let runs = self.run_chain(&drivers, episodes, purpose);
+            (certificate(&runs).cost_s(), runs)
         };
-        let new: Vec<usize> = (0..legs.len()).filter(|&index| is_new[index]).collect();
-        let learnt: Vec<Learnt> = new.par_iter().map(|&index| certify(index)).collect();
+        let (noise, episodes) = (&self.settings.noise, self.settings.learn.screening_episodes);
+        let few = screen(self.workspace, noise, episodes, |policy, episodes, round| {
+            drive(policy, episodes, &format!("screen {round}")).0
+        });
+        let driven =
+            few.into_iter().map(|policy| (drive(&policy, self.settings.repair_episodes, REPAIR), policy));
+        let best = driven.min_by(|a, b| a.0.0.total_cmp(&b.0.0));
+        let Some(((_, driven), policy)) = best.filter(|best| best.0.0 < certificate(runs).cost_s()) else {
+            return Ok(false);
+        };
+        let certify = |&index: &usize| {
+            let seed = self.settings.seed.child(&format!("together {}", legs[index].id), 0);
+            let starts = self.starts(&legs[index], seed).with_arrivals(arrivals(&driven, index));
+            let lesson = Lesson { next: legs.get(index + 1), ..self.lesson(&legs[index], starts, seed) };
+            let Certificate { tally: verified, mean_time_s } = lesson.certify(&policy);
+            let Learnt { env_steps, gradient_steps, .. } = self.learnt[&legs[index].id];
+            Learnt { policy: policy.clone(), verified, mean_time_s, env_steps, gradient_steps }
+        };
+        let learnt: Vec<Learnt> = new.par_iter().map(certify).collect();
         for (index, learnt) in new.into_iter().zip(learnt) {
             self.monitor.learnt(&legs[index], &learnt);
             self.keep(&legs[index], learnt)?;
