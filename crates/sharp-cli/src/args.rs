@@ -270,8 +270,9 @@ pub(crate) struct RegionsTrain {
     /// What computes: flex, or ndarray where it is compiled in.
     #[arg(long, default_value = "flex")]
     pub(crate) device: String,
-    /// Size of the run.
-    #[arg(long, default_value = "default", value_name = "tiny|default|paper")]
+    /// Size and kind of the run; paper-small has the nonlinearity, rate and batch of the paper and the rest of
+    /// default.
+    #[arg(long, default_value = "default", value_name = "tiny|default|paper|paper-small")]
     pub(crate) preset: String,
     /// Training maps, instead of the preset's number.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]

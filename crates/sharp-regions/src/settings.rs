@@ -6,7 +6,7 @@ use sharp_space::floorplan::FloorplanKind;
 
 use crate::device::ComputeDevice;
 use crate::labels::LabelSettings;
-use crate::unet::UNetConfig;
+use crate::unet::{Activation, UNetConfig};
 
 /// Kinds of floor plans that training never sees: scores are measured on them.
 pub const HELD_OUT_KINDS: [FloorplanKind; 3] =
@@ -75,6 +75,14 @@ impl TrainSettings {
             learning_rate: 1e-2,
             ..Self::default()
         }
+    }
+
+    /// The paper's nonlinearity, learning rate and batch with the default's network and labels: what they
+    /// are worth where the budget is the same.
+    #[must_use]
+    pub fn paper_small() -> Self {
+        let network = UNetConfig { activation: Activation::Tanh, ..UNetConfig::compact() };
+        Self { network, batch: 5, learning_rate: 1e-4, ..Self::default() }
     }
 
     /// The paper's numbers: 20 maps, 100 goals, 50 starts each, 50,000 steps of Adam at 1e-4; days

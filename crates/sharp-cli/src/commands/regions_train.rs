@@ -97,8 +97,9 @@ fn settings(args: &RegionsTrain, seed: u64) -> Result<TrainSettings, Failure> {
         "default" => TrainSettings::default(),
         "tiny" => TrainSettings::tiny(),
         "paper" => TrainSettings::paper(),
+        "paper-small" => TrainSettings::paper_small(),
         name => {
-            let message = format!("--preset is {name:?}, expected tiny, default or paper");
+            let message = format!("--preset is {name:?}, expected tiny, default, paper or paper-small");
             return Err(Failure::new("USAGE", message));
         }
     };
