@@ -25,7 +25,7 @@ pub struct Certificate {
 /// Episodes that are driven before anybody asks whether to go on.
 const BLOCK: u32 = 128;
 /// What a failure costs, seconds: somebody has to walk there and free the robot.
-const FAILURE_S: f64 = 1000.0;
+pub(crate) const FAILURE_S: f64 = 1000.0;
 
 impl Certificate {
     /// What `ends` showed: for each episode whether it succeeded, and its time in seconds.

@@ -5,7 +5,7 @@
 //! consists of guided legs only. That plan is as cheap as if every leg had been guided beforehand,
 //! and a leg that cannot be guided has lost its edge: the repair that downward refinability needs.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -104,7 +104,8 @@ pub struct Planner<'a> {
     query: Query,
     graph: OptionGraph,
     guided: BTreeMap<LegId, Result<Arc<Leg>, NoGuide>>,
-    banned: BTreeSet<LegId>,
+    /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
+    charges: BTreeMap<(LegId, LegId), f64>,
     seed: Seed,
 }
 
@@ -140,7 +141,7 @@ impl<'a> Planner<'a> {
         );
         let guided = BTreeMap::new();
         let mut this =
-            Self { workspace, abstraction, settings, query, graph, guided, banned: BTreeSet::new(), seed };
+            Self { workspace, abstraction, settings, query, graph, guided, charges: BTreeMap::new(), seed };
         for (id, guide) in known {
             if let Some(candidate) = this.graph.candidate(id).cloned() {
                 this.guided.insert(id, Ok(Arc::new(this.leg(&candidate, guide))));
@@ -149,9 +150,9 @@ impl<'a> Planner<'a> {
         Ok(this)
     }
 
-    /// Takes the leg called `id` out of all further searches.
-    pub fn ban(&mut self, id: LegId) {
-        self.banned.insert(id);
+    /// Makes all plans in which `after` follows `before` cost `seconds` more: a hand-over that was seen to fail.
+    pub fn charge(&mut self, before: LegId, after: LegId, seconds: f64) {
+        self.charges.insert((before, after), seconds);
     }
 
     /// The cheapest plan of guided legs, or `None`. `measured` knows what learnt legs cost, seconds.
@@ -164,9 +165,15 @@ impl<'a> Planner<'a> {
             monitor.phase(Phase::Search);
             let top_speed = self.workspace.robot.max_speed_mps;
             let cost = |leg: &Candidate| self.cost(leg, measured(leg.id));
-            let strict = |before: &Candidate, after: &Candidate| self.join(before, after);
+            let charge = |before: &Candidate, after: &Candidate| {
+                self.charges.get(&(before.id, after.id)).copied().unwrap_or(0.0)
+            };
+            let strict =
+                |before: &Candidate, after: &Candidate| self.join(before, after) + charge(before, after);
             // A hand-over that may fail is better than no plan: what it is worth will be measured.
-            let lenient = |before: &Candidate, after: &Candidate| strict(before, after).min(HARD_JOIN_S);
+            let lenient = |before: &Candidate, after: &Candidate| {
+                self.join(before, after).min(HARD_JOIN_S) + charge(before, after)
+            };
             let found = self.graph.search(top_speed, cost, strict);
             let (_, ids) = found.or_else(|| self.graph.search(top_speed, cost, lenient))?;
             let missing: Vec<LegId> =
@@ -191,9 +198,6 @@ impl<'a> Planner<'a> {
     }
 
     fn cost(&self, leg: &Candidate, measured: Option<f64>) -> f64 {
-        if self.banned.contains(&leg.id) {
-            return f64::INFINITY;
-        }
         let straight_m = (leg.end - leg.start).norm();
         let length_m = match self.guided.get(&leg.id) {
             Some(Ok(guided)) => guided.guide.length_m().max(straight_m),
@@ -354,15 +358,19 @@ mod tests {
     }
 
     #[test]
-    fn a_banned_leg_sends_the_plan_the_other_way_round() {
+    fn a_hand_over_that_was_seen_to_fail_sends_the_plan_the_other_way_round() {
         let world = world(RING, OptionKind::Interface);
         let mut planner =
             planner(&world, Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) });
         let first = planner.plan(&|_| None, &()).expect("two ways lead round");
-        let option = first.iter().find(|leg| matches!(leg.id, LegId::Option(_))).expect("an option").id;
-        planner.ban(option);
+        let ids = |legs: &[Arc<Leg>]| legs.iter().map(|leg| leg.id).collect::<Vec<_>>();
+        for pair in ids(&first).windows(2) {
+            planner.charge(pair[0], pair[1], 1000.0);
+        }
         let second = planner.plan(&|_| None, &()).expect("the other way");
-        assert!(second.iter().all(|leg| leg.id != option), "{} uses the banned {option}", names(&second));
+        let before = ids(&first);
+        let kept = ids(&second).windows(2).any(|pair| before.windows(2).any(|joined| joined == pair));
+        assert!(!kept, "{} keeps a hand-over of {}", names(&second), names(&first));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use sharp_rl::Progress;
 use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Seed;
 
-use crate::certify::{Certificate, Trial};
+use crate::certify::{Certificate, FAILURE_S, Trial};
 use crate::files::FileError;
 use crate::learn::{LearnSettings, LearningMode, Learnt, Lesson, LessonMonitor};
 use crate::leg::{Leg, LegId, Role};
@@ -29,6 +29,8 @@ const START_POOL: usize = 256;
 const ATTEMPTS_MAX: usize = 24;
 /// Plans run from end to end before the best of them is taken.
 const VERIFIED_MAX: usize = 4;
+/// A hand-over that was tried less often has shown nothing.
+const ENTERED_MIN: u32 = 50;
 
 /// All settings of [`solve`].
 #[derive(Clone, Debug)]
@@ -202,17 +204,8 @@ pub fn solve(
         Err(unplaced) => return Ok(Outcome::NoPlan(describe_unplaced(unplaced).to_owned())),
     };
     let before = library.iter().map(|(id, _)| LegId::Option(id)).collect();
-    let mut run = Run {
-        workspace,
-        query,
-        settings,
-        library,
-        monitor,
-        planner,
-        before,
-        learnt: BTreeMap::new(),
-        observed: BTreeMap::new(),
-    };
+    let mut run =
+        Run { workspace, query, settings, library, monitor, planner, before, learnt: BTreeMap::new() };
     let outcome = run.solve();
     monitor.phase(Phase::Done);
     outcome
@@ -236,8 +229,6 @@ struct Run<'a> {
     before: Vec<LegId>,
     /// Everything with a policy in this problem: from the library, or learnt now.
     learnt: BTreeMap<LegId, Learnt>,
-    /// What legs held in a plan where they fell short.
-    observed: BTreeMap<LegId, Tally>,
 }
 
 impl Run<'_> {
@@ -261,8 +252,7 @@ impl Run<'_> {
             verified += 1;
             let is_weak = self.is_weak(&solution);
             if is_weak {
-                let arrivals = solution.legs.iter().map(|planned| (planned.leg.id, planned.on_arrival));
-                self.observed.extend(arrivals.filter(|(_, tally)| tally.episodes > 0));
+                self.charge_joins(&solution.legs);
             }
             if best.as_ref().is_none_or(|best| solution.cost_s() < best.cost_s()) {
                 best = Some(solution);
@@ -284,12 +274,8 @@ impl Run<'_> {
 
     /// The cheapest plan by all that is known by now.
     fn search(&mut self) -> Option<Vec<Arc<Leg>>> {
-        let Self { planner, learnt, observed, monitor, .. } = self;
-        let cost = |id: LegId| {
-            let known = learnt.get(&id)?;
-            let tally = observed.get(&id).copied().unwrap_or(known.verified);
-            Some(Certificate { tally, mean_time_s: known.mean_time_s }.cost_s())
-        };
+        let Self { planner, learnt, monitor, .. } = self;
+        let cost = |id: LegId| learnt.get(&id).map(Learnt::cost_s);
         planner.plan(&cost, *monitor)
     }
 
@@ -303,6 +289,17 @@ impl Run<'_> {
 
     fn falls_short(&self, tally: Tally) -> bool {
         tally.episodes > 0 && tally.rate() < self.settings.usable_success
+    }
+
+    /// What legs hold less often on arrival than by themselves is the price of their hand-overs.
+    fn charge_joins(&mut self, legs: &[PlannedLeg]) {
+        for pair in legs.windows(2) {
+            let [before, after] = pair else { continue };
+            let loss = after.learnt.verified.rate() - after.on_arrival.rate();
+            if after.on_arrival.episodes >= ENTERED_MIN && loss > 0.0 {
+                self.planner.charge(before.leg.id, after.leg.id, FAILURE_S * loss);
+            }
+        }
     }
 
     /// Returns true if another way may be better than `solution`.
