@@ -142,13 +142,11 @@ fn regions_from_file(workspace: &Workspace, file: &str) -> Result<Vec<Region>, F
     Ok(regions)
 }
 
-/// Radius of a centroid or interface region where there is room for it, in units of the tolerance at the goal: enough for
-/// a path to round a corner within it.
-const RADII_PER_TOLERANCE: f64 = 2.0;
-
 /// How options are made for the robot of `workspace`.
 pub(crate) fn option_settings(workspace: &Workspace) -> OptionSettings {
-    let endpoint_radius_m = RADII_PER_TOLERANCE * workspace.robot.goal_tolerance_m;
+    // A car has to round the corners of its plans within them.
+    let factor = if workspace.robot.can_turn_in_place() { 1.0 } else { 2.0 };
+    let endpoint_radius_m = factor * workspace.robot.goal_tolerance_m;
     OptionSettings { endpoint_radius_m, ..OptionSettings::default() }
 }
 
