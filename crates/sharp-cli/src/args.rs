@@ -5,14 +5,14 @@ mod suites;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use serde::{Deserialize, Serialize};
+
+pub(crate) use suites::{Contender, Engine, Eval, Jobs, Selection, Submit, Suite};
 
 /// Samples of one plan of the baseline `rrt`, unless asked otherwise.
 pub(crate) const RRT_SAMPLES: usize = 30_000;
 /// Environment steps that the baseline `sac` may learn from, unless asked otherwise.
 pub(crate) const MAX_ENV_STEPS: u64 = 1_000_000;
-use serde::{Deserialize, Serialize};
-
-pub(crate) use suites::{Contender, Engine, Eval, Jobs, Selection, Submit, Suite};
 
 /// From a map to a policy that knows its odds: option learning for stochastic path planning.
 #[derive(Debug, Parser)]

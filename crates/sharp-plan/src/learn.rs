@@ -317,17 +317,18 @@ impl Lesson<'_> {
             }
         }
         // What a first choice lacks, the plan may not need: training takes longer than all the rest.
-        if beaten.is_some() && most.is_some_and(|most| most.rate() < self.settings.train_below) {
+        let weak = most.filter(|most| beaten.is_some() && most.rate() < self.settings.train_below);
+        let mut effort = (0, 0);
+        if let Some(most) = weak {
             let trained = self.train_on(monitor)?;
             let alone = Certificate { tally: trained.verified, mean_time_s: trained.mean_time_s };
             let judged = if self.tail.is_empty() { alone } else { self.judge(&trained.policy) };
-            if most.is_none_or(|most| judged.tally.successes > most.successes) {
+            if judged.tally.successes > most.successes {
                 return Ok(Some(trained));
             }
-            let effort = (trained.env_steps, trained.gradient_steps);
-            return Ok(best.map(|(judged, policy)| self.learnt(policy, judged, effort)));
+            effort = (trained.env_steps, trained.gradient_steps);
         }
-        Ok(best.map(|(judged, policy)| self.learnt(policy, judged, (0, 0))))
+        Ok(best.map(|(judged, policy)| self.learnt(policy, judged, effort)))
     }
 
     /// The prior as it was trained on other maps.

@@ -12,8 +12,6 @@ use crate::policy::PolarWaypoint;
 
 /// Time step of the model, seconds: two control periods.
 pub(crate) const MODEL_DT_S: f64 = 0.1;
-/// Time steps of an action.
-const STEPS: usize = 5;
 
 /// What sets one robot on one floor apart from its data sheet; constant for an episode.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +46,7 @@ impl Model {
         mut is_free: impl FnMut(&RobotState) -> bool,
     ) -> bool {
         let aim = self.controller.aim(&state.pose, waypoint.to_world(&state.pose), waypoint.speed_mps);
-        (0..STEPS).all(|_| {
+        (0..steps()).all(|_| {
             let command = self.controller.command(state, &aim);
             self.follow(state, command, traits);
             is_free(state)
@@ -66,7 +64,7 @@ impl Model {
     ) -> Slopes {
         let aim = self.controller.aim(&state.pose, waypoint.to_world(&state.pose), waypoint.speed_mps);
         let (mut turn, mut rate) = (Slopes::default(), Slopes::default());
-        for _ in 0..STEPS {
+        for _ in 0..steps() {
             let (command, slope) = self.controller.command_and_slope(state, &aim);
             let response = self.follow(state, command, traits);
             let (Command::Twist { yaw_rate_radps: asked, .. } | Command::Steer { steer_rad: asked, .. }) =
@@ -151,6 +149,11 @@ struct Response {
     is_limited: bool,
     /// Turn per yaw rate or steering angle.
     turn: f64,
+}
+
+/// Time steps of an action.
+fn steps() -> usize {
+    (ActionSettings::default().action_s / MODEL_DT_S).round() as usize
 }
 
 fn approach(value: f64, target: f64, step: f64) -> f64 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
 use sharp_sim::{ActionSettings, Drive, NoiseModel, RobotModel, RobotState, World};
-use sharp_space::{FootprintChecker, Heading, OccupancyGrid, Pose, Vector, trig};
+use sharp_space::{CollisionChecker, FootprintChecker, Heading, OccupancyGrid, Pose, Vector, trig};
 
 use crate::belief::Belief;
 use crate::model::Model;
@@ -57,6 +57,11 @@ impl Workspace {
         let model = Arc::new(Model::new(&robot));
         let spares = Spare::all(&robot, &checker).into();
         Self { grid: Arc::new(grid), robot: Arc::new(robot), checker, world, spares, model }
+    }
+
+    /// The spares that could stand at `start`, the most to spare first; the robot itself is the last.
+    pub(crate) fn spares_at(&self, start: Option<Pose>) -> impl Iterator<Item = &Spare> {
+        self.spares.iter().filter(move |spare| start.is_none_or(|start| spare.checker.is_free(start)))
     }
 }
 

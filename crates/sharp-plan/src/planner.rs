@@ -13,13 +13,12 @@ use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, NoGuide, pla
 use sharp_motion::Steering;
 use sharp_options::{Endpoint, OptionSet};
 use sharp_rbvd::{Rbvd, StateId};
-use sharp_space::{Cell, CollisionChecker, Heading, Point, Pose, Seed, Stream};
+use sharp_space::{Cell, Heading, Point, Pose, Seed, Stream};
 
 use crate::leg::{Leg, LegId, allowed_states, endpoints};
 use crate::percept::Workspace;
 use crate::search::{Candidate, OptionGraph};
 use crate::sharp::{Monitor, Phase};
-use crate::spare::Spare;
 
 /// Legs whose ends are further apart than this cross their interfaces at right angles, metres.
 const CROSSING_M: f64 = 1.2;
@@ -289,11 +288,8 @@ impl<'a> Planner<'a> {
     /// A guide for the largest robot for which there is one.
     fn spared(&self, request: &GuideRequest<'_>, rng: &mut Stream) -> Option<GuidePath> {
         let settings = self.settings.guide.unsampled();
-        let stands = |spare: &&Spare| {
-            let start = request.start;
-            start.heading.is_none_or(|heading| spare.checker.is_free(Pose::at(start.position, heading)))
-        };
-        let mut spares = self.workspace.spares.iter().filter(stands);
+        let start = request.start.heading.map(|heading| Pose::at(request.start.position, heading));
+        let mut spares = self.workspace.spares_at(start);
         spares.find_map(|spare| plan_guide(request, &spare.checker, &spare.steering, &settings, rng).ok())
     }
 

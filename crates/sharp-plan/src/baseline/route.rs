@@ -6,7 +6,7 @@
 use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, plan_guide};
 use sharp_motion::{HybridSettings, Path, Steering, hybrid_astar};
 use sharp_sim::RobotState;
-use sharp_space::{CollisionChecker, Heading, Point, Pose, Seed};
+use sharp_space::{Heading, Point, Pose, Seed};
 
 use crate::baseline::{Readiness, Situation, nominal_time_s};
 use crate::pace::SpeedRule;
@@ -47,7 +47,7 @@ impl<'a> RoutePlanner<'a> {
 
     /// What a robot at `start` has the room to spare for, the most first.
     pub(crate) fn attempts(&self, start: Pose) -> impl Iterator<Item = &Spare> {
-        self.workspace.spares.iter().filter(move |spare| spare.checker.is_free(start))
+        self.workspace.spares_at(Some(start))
     }
 }
 

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, smooth_guide};
-use sharp_space::{Cell, CollisionChecker, Point, Pose};
+use sharp_space::{Cell, Point, Pose};
 
 use crate::leg::Leg;
 use crate::percept::Workspace;
@@ -62,7 +62,7 @@ fn joined(
     };
     let disc = |leg: &Arc<Leg>| leg.target.endpoint().map(|set| (set.center, MEETS * set.radius_m));
     let discs: Vec<(Point, f64)> = legs.iter().filter_map(disc).collect();
-    let path = workspace.spares.iter().filter(|spare| spare.checker.is_free(query.start)).find_map(|spare| {
+    let path = workspace.spares_at(Some(query.start)).find_map(|spare| {
         let Spare { checker, steering } = spare;
         let path = smooth_guide((&way, &discs), &request, checker, steering, settings).ok()?;
         cuts(legs, &path).map(|cuts| (path, cuts))
