@@ -1,4 +1,5 @@
-//! Centroid options `O_c = { o_ij | V(s_i, s_j) = 1 }` with endpoints as in Definition 4.
+//! Centroid options `O_c = { o_ij | V(s_i, s_j) = 1 }` with endpoints as in Definition 4, and those
+//! that pass a centroid by.
 
 use sharp_rbvd::{Rbvd, StateId};
 
@@ -17,4 +18,18 @@ pub(crate) fn synthesize(rbvd: &Rbvd, settings: &OptionSettings) -> (Vec<Endpoin
         })
     };
     (endpoints, rbvd.states().flat_map(leaving).collect())
+}
+
+/// One option for each way over a state between two that are no neighbours.
+pub(crate) fn passing(rbvd: &Rbvd) -> Vec<OptionSpec> {
+    let over = |from: StateId, through: StateId| {
+        let far = move |to: &StateId| *to != from && !rbvd.neighbors(from).contains(to);
+        rbvd.neighbors(through).iter().copied().filter(far).map(move |to| OptionSpec {
+            id: OptionId::Passing { from, through, to },
+            initiation: EndpointId(from.0),
+            termination: EndpointId(to.0),
+        })
+    };
+    let leaving = |from: StateId| rbvd.neighbors(from).iter().flat_map(move |&through| over(from, through));
+    rbvd.states().flat_map(leaving).collect()
 }

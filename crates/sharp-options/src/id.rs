@@ -19,7 +19,7 @@ pub enum OptionKind {
 
 /// Names an option `o_ij` or `o_ijk`.
 ///
-/// Written and serialised as `c:3-7` or `i:3-7-9`. If a pair of states shares several portals,
+/// Written and serialised as `c:3-7`, `c:3-7-9` or `i:3-7-9`. If a pair of states shares several portals,
 /// `@` and the portals' positions among those of their pairs follow: `i:3-7-9@0.1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
@@ -29,6 +29,16 @@ pub enum OptionId {
         /// The state i it leaves.
         from: StateId,
         /// The state j it enters.
+        to: StateId,
+    },
+    /// From the centroid of i to that of k through j, whose centroid it passes by: where that lies
+    /// aside, a robot that cannot turn on the spot could not go on from it. The paper has none.
+    Passing {
+        /// The state i it leaves.
+        from: StateId,
+        /// The state j it crosses.
+        through: StateId,
+        /// The state k it enters.
         to: StateId,
     },
     /// An interface option `o_ijk`.
@@ -50,7 +60,7 @@ impl OptionId {
     #[must_use]
     pub const fn kind(self) -> OptionKind {
         match self {
-            Self::Centroid { .. } => OptionKind::Centroid,
+            Self::Centroid { .. } | Self::Passing { .. } => OptionKind::Centroid,
             Self::Interface { .. } => OptionKind::Interface,
         }
     }
@@ -59,24 +69,24 @@ impl OptionId {
     #[must_use]
     pub const fn from(self) -> StateId {
         match self {
-            Self::Centroid { from, .. } | Self::Interface { from, .. } => from,
+            Self::Centroid { from, .. } | Self::Passing { from, .. } | Self::Interface { from, .. } => from,
         }
     }
 
-    /// The state it crosses: j of an interface option.
+    /// The state it crosses: j of `o_ijk`.
     #[must_use]
     pub const fn through(self) -> Option<StateId> {
         match self {
             Self::Centroid { .. } => None,
-            Self::Interface { through, .. } => Some(through),
+            Self::Passing { through, .. } | Self::Interface { through, .. } => Some(through),
         }
     }
 
-    /// The state it enters: j of a centroid option, k of an interface option.
+    /// The state it enters: j of `o_ij`, k of `o_ijk`.
     #[must_use]
     pub const fn to(self) -> StateId {
         match self {
-            Self::Centroid { to, .. } | Self::Interface { to, .. } => to,
+            Self::Centroid { to, .. } | Self::Passing { to, .. } | Self::Interface { to, .. } => to,
         }
     }
 }
@@ -85,6 +95,7 @@ impl fmt::Display for OptionId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Centroid { from, to } => write!(f, "c:{}-{}", from.0, to.0),
+            Self::Passing { from, through, to } => write!(f, "c:{}-{}-{}", from.0, through.0, to.0),
             Self::Interface { from, through, to, portals } => {
                 write!(f, "i:{}-{}-{}", from.0, through.0, to.0)?;
                 portals.map_or(Ok(()), |(entry, exit)| write!(f, "@{entry}.{exit}"))
@@ -95,7 +106,7 @@ impl fmt::Display for OptionId {
 
 /// A text that names no option.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{0:?} names no option, expected c:FROM-TO or i:FROM-THROUGH-TO or i:FROM-THROUGH-TO@ENTRY.EXIT")]
+#[error("{0:?} names no option, expected c:FROM-TO, c:FROM-THROUGH-TO, i:FROM-THROUGH-TO or i:FROM-THROUGH-TO@ENTRY.EXIT")]
 pub struct OptionIdError(pub String);
 
 impl FromStr for OptionId {
@@ -131,8 +142,12 @@ fn parse(text: &str) -> Option<OptionId> {
     let states: Option<Vec<StateId>> = states.split('-').map(|s| s.parse().ok().map(StateId)).collect();
     match (kind, states?[..].as_ref(), portals) {
         ("c", &[from, to], None) if from != to => Some(OptionId::Centroid { from, to }),
-        ("i", &[from, through, to], portals) if from != through && through != to && from != to => {
-            Some(OptionId::Interface { from, through, to, portals })
+        (kind, &[from, through, to], portals) if from != through && through != to && from != to => {
+            match (kind, portals) {
+                ("c", None) => Some(OptionId::Passing { from, through, to }),
+                ("i", portals) => Some(OptionId::Interface { from, through, to, portals }),
+                _ => None,
+            }
         }
         _ => None,
     }
@@ -147,10 +162,10 @@ mod tests {
         arbtest::arbtest(|u| {
             let [from, through, to] =
                 [0, 1, 2].map(|i| StateId(u.arbitrary::<u32>().unwrap_or(i) / 3 * 3 + i));
-            let id = if u.arbitrary()? {
-                OptionId::Centroid { from, to }
-            } else {
-                OptionId::Interface { from, through, to, portals: u.arbitrary()? }
+            let id = match u.int_in_range(0..=2)? {
+                0 => OptionId::Centroid { from, to },
+                1 => OptionId::Passing { from, through, to },
+                _ => OptionId::Interface { from, through, to, portals: u.arbitrary()? },
             };
             assert_eq!(id.to_string().parse(), Ok(id), "{id}");
             let stored = ron::to_string(&id).unwrap();
@@ -169,8 +184,10 @@ mod tests {
             "c:3-3",
             "c:03-7",
             "c:+3-7",
-            "c:3-7-9",
+            "c:3-7-3",
             "c:3-7@0.1",
+            "c:3-7-9@0.1",
+            "x:1-2-3",
             "x:1-2",
             "c:-1-2",
             "c:3-7 ",

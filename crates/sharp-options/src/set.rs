@@ -37,7 +37,7 @@ impl Default for OptionSettings {
 
 /// Where a robot may be while it executes an option; elsewhere it has strayed.
 ///
-/// Every rule allows both endpoints and, for a centroid option, both its states.
+/// Every rule allows both endpoints and, for a centroid option, all its states.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AllowedRule {
@@ -70,6 +70,8 @@ pub struct OptionSet {
     options: Vec<OptionSpec>,
     /// Positions in `options`, sorted by id.
     by_id: Vec<u32>,
+    /// Options past a centroid, sorted by id.
+    passing: Vec<OptionSpec>,
 }
 
 impl OptionSet {
@@ -83,7 +85,9 @@ impl OptionSet {
         options.sort_unstable_by_key(|option| (option.initiation, option.termination));
         let mut by_id: Vec<u32> = (0..options.len() as u32).collect();
         by_id.sort_unstable_by_key(|&position| options[position as usize].id);
-        Self { kind, endpoints, options, by_id }
+        let mut passing = if kind == OptionKind::Centroid { centroid::passing(rbvd) } else { Vec::new() };
+        passing.sort_unstable_by_key(|option| option.id);
+        Self { kind, endpoints, options, by_id, passing }
     }
 
     /// The family of its options.
@@ -119,12 +123,22 @@ impl OptionSet {
         &self.options
     }
 
-    /// The option called `id`, if it is in the set.
+    /// The options that pass a centroid by, sorted by id: none where there are interfaces. They are
+    /// no part of the paper's O and so of none of the lists above and below; [`OptionSet::get`] knows them.
+    #[must_use]
+    pub fn passing(&self) -> &[OptionSpec] {
+        &self.passing
+    }
+
+    /// The option called `id`, if it is in the set or passes a centroid of it by.
     #[must_use]
     pub fn get(&self, id: OptionId) -> Option<&OptionSpec> {
         let spec = |position: u32| &self.options[position as usize];
-        let found = self.by_id.binary_search_by_key(&id, |&position| spec(position).id).ok()?;
-        Some(spec(self.by_id[found]))
+        if let Ok(found) = self.by_id.binary_search_by_key(&id, |&position| spec(position).id) {
+            return Some(spec(self.by_id[found]));
+        }
+        let found = self.passing.binary_search_by_key(&id, |option| option.id).ok()?;
+        Some(&self.passing[found])
     }
 
     /// The options that start in `endpoint`, sorted by termination.

@@ -59,6 +59,21 @@ fn centroid_options_join_neighbours_both_ways() {
 }
 
 #[test]
+fn a_centroid_is_passed_by_on_the_way_between_states_that_are_no_neighbours() {
+    let passing = |kind| {
+        let set = options(&diagram(ROOMS_ON_A_CORRIDOR), kind);
+        for option in set.passing() {
+            assert_eq!(set.get(option.id), Some(option), "found by name");
+            assert!(!set.options().contains(option), "{} is none of the paper's", option.id);
+            assert_eq!(AllowedRule::Code.states(option.id).count(), 3, "{} crosses a state", option.id);
+        }
+        set.passing().iter().map(|option| option.id.to_string()).collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(passing(OptionKind::Centroid), "c:0-1-2 c:2-1-0");
+    assert_eq!(passing(OptionKind::Interface), "", "an interface has no centroid to pass");
+}
+
+#[test]
 fn interface_options_cross_a_state_from_neighbour_to_neighbour() {
     check(
         ROOMS_ON_A_CORRIDOR,

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use sharp_guide::{GuideEnd, GuidePath, GuideRequest, GuideSettings, NoGuide, plan_guide};
 use sharp_motion::Steering;
-use sharp_options::{Endpoint, OptionSet};
+use sharp_options::{Endpoint, OptionId, OptionSet};
 use sharp_rbvd::{Rbvd, StateId};
 use sharp_space::{Cell, Heading, Point, Pose, Seed, Stream};
 
@@ -55,9 +55,11 @@ pub struct SearchSettings {
     pub nominal_speed_mps: f64,
     /// Seconds added to a leg without a policy: what training is worth; 0 is the paper's rule.
     pub untrained_surcharge_s: f64,
-    /// Seconds added to a first or last leg that passes a centroid by: no later problem can reuse it,
-    /// and the paper knows no such leg.
+    /// Seconds added to a leg that passes a centroid by: no later problem can reuse it if it is a first or
+    /// last one, few can if it is an option, and the paper knows no such leg.
     pub shortcut_surcharge_s: f64,
+    /// Options may pass a centroid by; false keeps to the paper's.
+    pub passing: bool,
     /// Learnt legs cost what was measured of them (line 18 of Algorithm 1); false keeps the first costs.
     pub cost_update: bool,
     /// Largest turn between two guides that a robot which turns in place takes in its stride, radians.
@@ -76,6 +78,7 @@ impl SearchSettings {
             nominal_speed_mps: 0.5 * workspace.robot.max_speed_mps,
             untrained_surcharge_s: 8.0,
             shortcut_surcharge_s: 14.0,
+            passing: true,
             cost_update: true,
             // The footprint swings out in a turn: beyond 75 degrees it needs room or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),
@@ -197,6 +200,9 @@ impl<'a> Planner<'a> {
     }
 
     fn cost(&self, leg: &Candidate, measured: Option<f64>) -> f64 {
+        if !self.settings.passing && matches!(leg.id, LegId::Option(OptionId::Passing { .. })) {
+            return f64::INFINITY;
+        }
         let straight_m = (leg.end - leg.start).norm();
         let length_m = match self.guided.get(&leg.id) {
             Some(Ok(guided)) => guided.guide.length_m().max(straight_m),
@@ -409,6 +415,34 @@ mod tests {
             let legs = planner.expect("both ends have a state").plan(&|_| None, &());
             assert!(legs.is_some(), "no plan where turns of {smooth_turn_rad} rad are smooth");
         }
+    }
+
+    /// A corridor of 2 m with a dead end off it, in which the region of the middle state lies.
+    const ALCOVE: &str = "
+        ###########################
+        ###########.....###########
+        ###########.....###########
+        ###########..1..###########
+        ###########.....###########
+        ###########.....###########
+        #.........................#
+        #.........................#
+        #...0.................2...#
+        #.........................#
+        #.........................#
+        ###########################";
+
+    #[test]
+    fn a_centroid_from_which_nobody_gets_on_is_passed_by() {
+        let world = world(ALCOVE, OptionKind::Centroid);
+        let query = Query { start: Pose::new(1.0, 1.4, 0.0), goal: Pose::new(9.8, 1.4, 0.0) };
+        let names = |passing| {
+            let settings = SearchSettings { passing, ..SearchSettings::new(&world.0) };
+            let planner = Planner::new(&world.0, &world.1, settings, query, [], Seed(1));
+            names(&planner.expect("both ends have a state").plan(&|_| None, &()).expect("a way"))
+        };
+        assert_eq!(names(true), "first:0 c:0-1-2 last:2");
+        assert_eq!(names(false), "first:0 c:0-1 c:1-2 last:2", "the paper's options turn round in the dead end");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use petgraph::algo::astar;
 use petgraph::graph::{DiGraph, NodeIndex};
-use sharp_options::{Endpoint, EndpointId, EndpointSite, OptionKind, OptionSet, OptionSpec};
+use sharp_options::{Endpoint, EndpointId, EndpointSite, OptionId, OptionKind, OptionSet, OptionSpec};
 use sharp_rbvd::{Rbvd, StateId};
 use sharp_space::{Point, Pose};
 
@@ -25,7 +25,7 @@ pub struct Candidate {
     pub from: StateId,
     /// The state it ends in.
     pub to: StateId,
-    /// True for a first or last leg past a centroid of the state it begins or ends in.
+    /// True for a leg past a centroid: of the state that it begins, ends or, an option, is on the way in.
     pub is_shortcut: bool,
     /// Centre of the initiation set.
     pub start: Point,
@@ -60,7 +60,8 @@ impl OptionGraph {
                 entering.entry((endpoint, to)).or_default().push(node);
             }
         }
-        for spec in options.options() {
+        let all = || options.options().iter().chain(options.passing());
+        for spec in all() {
             let node = this.add(option_candidate(options, spec));
             entering.entry((spec.termination, entered(spec))).or_default().push(node);
         }
@@ -71,7 +72,7 @@ impl OptionGraph {
                 this.graph.add_edge(before, node, ());
             }
         }
-        for spec in options.options() {
+        for spec in all() {
             let node = this.nodes[&LegId::Option(spec.id)];
             for &before in entering.get(&(spec.initiation, left(spec))).into_iter().flatten() {
                 if !goes_back(this.graph[before].as_ref(), spec) {
@@ -133,7 +134,10 @@ fn entered(spec: &OptionSpec) -> StateId {
 
 /// The state in which a robot that may begin `spec` is about to be.
 fn left(spec: &OptionSpec) -> StateId {
-    spec.id.through().unwrap_or(spec.id.from())
+    match spec.id.kind() {
+        OptionKind::Centroid => spec.id.from(),
+        OptionKind::Interface => spec.id.through().unwrap_or(spec.id.from()),
+    }
 }
 
 /// A centroid option back to where the one before came from never helps.
@@ -147,7 +151,7 @@ fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
         id: LegId::Option(spec.id),
         from: spec.id.from(),
         to: spec.id.to(),
-        is_shortcut: false,
+        is_shortcut: matches!(spec.id, OptionId::Passing { .. }),
         start: options.endpoint(spec.initiation).center,
         end: options.endpoint(spec.termination).center,
         endpoint: Some(spec.termination),

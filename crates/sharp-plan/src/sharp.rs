@@ -67,6 +67,7 @@ impl SolveSettings {
         if mode == LearningMode::Paper {
             search.untrained_surcharge_s = 0.0;
             search.spares = false;
+            search.passing = false;
         }
         Self {
             learn: LearnSettings::new(mode),

@@ -75,7 +75,7 @@ pub fn courses(
     queries: &[Query],
     seed: Seed,
 ) -> Vec<Course> {
-    let settings = SearchSettings::new(workspace);
+    let settings = SearchSettings { passing: false, ..SearchSettings::new(workspace) };
     let course = |query: &Query| {
         let mut planner = Planner::new(workspace, abstraction, settings, *query, [], seed).ok()?;
         let legs = planner.plan(&|_| None, &())?;
