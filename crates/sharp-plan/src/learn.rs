@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sharp_guide::{Place, PseudoReward, ShapedReward, StepEvents};
 use sharp_rl::{
@@ -406,7 +407,7 @@ pub(crate) fn screen(
     workspace: &Workspace,
     noise: &NoiseModel,
     episodes: u32,
-    cost_s: impl Fn(&OptionPolicy, u32, u64) -> f64,
+    cost_s: impl Fn(&OptionPolicy, u32, u64) -> f64 + Sync,
 ) -> Vec<OptionPolicy> {
     let robot = &workspace.robot;
     let mut left: Vec<OptionPolicy> =
@@ -416,7 +417,7 @@ pub(crate) fn screen(
     for (round, (share, keep)) in (0..).zip(ROUNDS) {
         let episodes = (share * f64::from(episodes)).ceil() as u32;
         let mut costs: Vec<(f64, OptionPolicy)> =
-            left.into_iter().map(|policy| (cost_s(&policy, episodes, round), policy)).collect();
+            left.into_par_iter().map(|policy| (cost_s(&policy, episodes, round), policy)).collect();
         costs.sort_by(|a, b| a.0.total_cmp(&b.0));
         left = costs.into_iter().take(keep).map(|(_, policy)| policy).collect();
     }

@@ -100,8 +100,13 @@ impl Run<'_> {
     fn relearn_weak(&mut self, legs: &[Arc<Leg>], runs: &[ChainRun], round: u64) -> Result<bool, FileError> {
         // n legs that each fail at most a share (1 - wanted) / n make a plan that holds as wanted.
         let leg_wanted = 1.0 - (1.0 - self.settings.wanted_success) / legs.len() as f64;
-        let is_weak = |tally: &Tally| tally.episodes >= 50 && tally.rate() < leg_wanted;
         let on_arrival = tallies(runs, legs.len());
+        // Those that lose less than the mean leg have their turn in the next round.
+        let lost: u32 = on_arrival.iter().map(|tally| tally.failures()).sum();
+        let mean_lost = f64::from(lost) / legs.len() as f64;
+        let is_weak = |tally: &Tally| {
+            tally.episodes >= 50 && tally.rate() < leg_wanted && f64::from(tally.failures()) >= mean_lost
+        };
         // Who arrives badly is as much to blame as who cannot cope with it.
         let is_to_blame =
             |index: usize| is_weak(&on_arrival[index]) || on_arrival.get(index + 1).is_some_and(is_weak);
