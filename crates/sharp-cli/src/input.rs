@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::ErrorKind;
+use std::path::Path;
 
 use sharp_maps::{LoadOptions, MapFile, load};
 use sharp_plan::{Query, Workspace};
@@ -91,6 +92,22 @@ pub(crate) fn pose(flag: &str, text: &str) -> Result<Pose, Failure> {
         return Err(broken());
     }
     Ok(Pose::new(x, y, yaw))
+}
+
+/// Refuses a `folder` that could not be made or written, before the work for it is done; leaves nothing behind.
+pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
+    let mut there = folder;
+    while !there.exists() {
+        match there.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+            Some(parent) => there = parent,
+            None => there = Path::new("."),
+        }
+    }
+    tempfile::tempfile_in(there).map(drop).map_err(|error| {
+        let message =
+            format!("--out is {}, but in {} no file can be made: {error}", folder.display(), there.display());
+        Failure::new("FILE_INVALID", message)
+    })
 }
 
 /// Verifies that both ends of `query` can be stood on.
@@ -198,5 +215,17 @@ mod tests {
             assert!(message.contains("--start") && message.contains(&format!("{text:?}")), "{message}");
         }
         assert_eq!(pose("--goal", "-1.5, 2,3").unwrap(), Pose::new(-1.5, 2.0, 3.0));
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_refused_at_once_and_others_are_not_made() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("file");
+        fs::write(&file, "").expect("a file");
+        let message = check_out(&file.join("plan")).unwrap_err().to_string();
+        assert!(message.contains("--out") && message.contains("file/plan"), "{message}");
+        let new = folder.path().join("some/where");
+        check_out(&new).expect("can be made");
+        assert!(!folder.path().join("some").exists(), "asking makes nothing");
     }
 }

@@ -106,7 +106,9 @@ impl fmt::Display for OptionId {
 
 /// A text that names no option.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{0:?} names no option, expected c:FROM-TO, c:FROM-THROUGH-TO, i:FROM-THROUGH-TO or i:FROM-THROUGH-TO@ENTRY.EXIT")]
+#[error(
+    "{0:?} names no option, expected c:FROM-TO, c:FROM-THROUGH-TO, i:FROM-THROUGH-TO or i:FROM-THROUGH-TO@ENTRY.EXIT"
+)]
 pub struct OptionIdError(pub String);
 
 impl FromStr for OptionId {

@@ -442,7 +442,11 @@ mod tests {
             names(&planner.expect("both ends have a state").plan(&|_| None, &()).expect("a way"))
         };
         assert_eq!(names(true), "first:0 c:0-1-2 last:2");
-        assert_eq!(names(false), "first:0 c:0-1 c:1-2 last:2", "the paper's options turn round in the dead end");
+        assert_eq!(
+            names(false),
+            "first:0 c:0-1 c:1-2 last:2",
+            "the paper's options turn round in the dead end"
+        );
     }
 
     #[test]

@@ -59,6 +59,7 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     let robot = input::robot(&args.abstraction.robot)?;
     let workspace = Workspace::new(map.grid.clone(), robot);
     input::check_query(&workspace, &query)?;
+    args.out.as_deref().map_or(Ok(()), input::check_out)?;
     let mut library = pipeline::library(args.library.as_deref(), &workspace, &noise, args.learning)?;
     stopwatch.stop();
 
