@@ -1,9 +1,12 @@
 //! The command as a user meets it: exit codes, messages, files, and equal bytes for equal seeds.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::Instant;
 
 use serde_json::Value;
 
@@ -193,6 +196,58 @@ fn a_library_is_reused_and_a_damaged_one_is_named() {
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let message = json(&output)["error"]["message"].to_string();
     assert!(message.contains(option.file_name().unwrap().to_str().unwrap()), "{message}");
+}
+
+/// What lies in `folder` and below, by path, but for wall times and for the pictures that only who predicts
+/// the regions draws.
+fn files_in(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for path in fs::read_dir(next).unwrap().map(|entry| entry.unwrap().path()) {
+            match path.file_name().unwrap().to_str().unwrap() {
+                "solve.json" | "regions.png" | "regions.svg" => {}
+                _ if path.is_dir() => folders.push(path),
+                _ => {
+                    _ = files.insert(path.strip_prefix(folder).unwrap().to_owned(), fs::read(&path).unwrap())
+                }
+            }
+        }
+    }
+    files
+}
+
+#[test]
+fn a_solve_that_was_killed_begins_anew_and_comes_to_the_same_bytes() {
+    let solve = |folder: &Path| {
+        let args = "--json solve a --problem 5 --options centroid --library lib --out plan".split(' ');
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sharp"));
+        command.current_dir(folder).args(args).stdout(Stdio::null()).stderr(Stdio::null());
+        command
+    };
+    let [undisturbed, killed] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let begun = Instant::now();
+    assert!(solve(undisturbed.path()).status().unwrap().success());
+    let takes = begun.elapsed();
+    let mut struck = 0;
+    for moment in [0.2, 0.4, 0.6] {
+        let mut child = solve(killed.path()).spawn().unwrap();
+        sleep(takes.mul_f64(moment));
+        struck += usize::from(child.try_wait().unwrap().is_none());
+        child.kill().unwrap();
+        if child.wait().unwrap().success() {
+            break;
+        }
+    }
+    assert!(struck > 0, "it was over before the first kill");
+    if !killed.path().join("plan/solve.json").exists() {
+        assert!(solve(killed.path()).status().unwrap().success());
+    }
+    let [expected, found] = [&undisturbed, &killed].map(|folder| files_in(folder.path()));
+    assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
+    assert!(expected.keys().any(|path| path.to_string_lossy().contains("/c_")), "options are kept");
+    let other: Vec<_> = found.iter().filter(|(path, bytes)| expected[*path] != **bytes).collect();
+    assert!(other.is_empty(), "{:?} differ", other.iter().map(|(path, _)| path).collect::<Vec<_>>());
 }
 
 #[test]

@@ -6,7 +6,7 @@
 //! never a mix. When the map changes, an option whose corridor did not change keeps its policy and
 //! its certificate ([`OptionLibrary::adopt`]).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -102,6 +102,8 @@ pub struct OptionLibrary {
     options: BTreeMap<OptionId, StoredOption>,
     /// Files of the same world with other maps, by corridor.
     elsewhere: BTreeMap<String, PathBuf>,
+    /// Options that are to be written by [`OptionLibrary::save`]; `None` where they are written at once.
+    unsaved: Option<BTreeSet<OptionId>>,
 }
 
 impl OptionLibrary {
@@ -133,7 +135,25 @@ impl OptionLibrary {
             options.insert(file.id, load_option(file, &folder)?);
         }
         let elsewhere = files_elsewhere(root, key);
-        Ok(Self { folder: Some(folder), options, elsewhere })
+        Ok(Self { folder: Some(folder), options, elsewhere, unsaved: None })
+    }
+
+    /// From now on what is inserted reaches the disk with [`save`](Self::save) only: whoever is killed
+    /// before that begins anew from the same library, and so comes to the same plan.
+    pub fn defer(&mut self) {
+        self.unsaved.get_or_insert_default();
+    }
+
+    /// Writes what was inserted since [`defer`](Self::defer).
+    ///
+    /// # Errors
+    /// Returns an error that names the file that could not be written; it and all after it stay unsaved.
+    pub fn save(&mut self) -> Result<(), FileError> {
+        while let Some(&id) = self.unsaved.iter().flatten().next() {
+            self.write(id, &self.options[&id])?;
+            self.unsaved.iter_mut().for_each(|unsaved| _ = unsaved.remove(&id));
+        }
+        Ok(())
     }
 
     /// The option that was learnt in the same world with another map, in a corridor that is the same
@@ -173,11 +193,20 @@ impl OptionLibrary {
         self.options.is_empty()
     }
 
-    /// Adds or replaces the option called `id`, on disk first.
+    /// Adds or replaces the option called `id`, on disk first unless that is [deferred](Self::defer).
     ///
     /// # Errors
     /// Returns an error that names the file that could not be written; memory is unchanged then.
     pub fn insert(&mut self, id: OptionId, option: StoredOption) -> Result<(), FileError> {
+        match &mut self.unsaved {
+            Some(unsaved) => _ = unsaved.insert(id),
+            None => self.write(id, &option)?,
+        }
+        self.options.insert(id, option);
+        Ok(())
+    }
+
+    fn write(&self, id: OptionId, option: &StoredOption) -> Result<(), FileError> {
         if let Some(folder) = &self.folder {
             let file = OptionFile {
                 format: FORMAT,
@@ -192,7 +221,6 @@ impl OptionLibrary {
             };
             files::write_ron(&folder.join(file_name(id)), &file)?;
         }
-        self.options.insert(id, option);
         Ok(())
     }
 }

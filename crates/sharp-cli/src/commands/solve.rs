@@ -73,6 +73,10 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     }
     let curves = args.tensorboard.as_deref();
     let monitor = SolveMonitor::new(stopwatch, time_limit, spinner, curves);
+    // Hours of training are kept at once; they are the same whatever else the library holds.
+    if args.learning != Learning::Paper {
+        library.defer();
+    }
     let outcome = solve(&workspace, &abstraction, query, &settings, &mut library, &monitor)?;
     let stopwatch = monitor.into_stopwatch();
 
@@ -107,6 +111,7 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     let plan = plan
         .map(|(plan, folder)| write_plan(&plan, &folder, &built, &query, &report).map(|()| plan))
         .transpose()?;
+    library.save()?;
     Ok(Solved { report, plan })
 }
 
