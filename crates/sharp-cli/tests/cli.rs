@@ -209,7 +209,8 @@ fn files_in(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
                 "solve.json" | "regions.png" | "regions.svg" => {}
                 _ if path.is_dir() => folders.push(path),
                 _ => {
-                    _ = files.insert(path.strip_prefix(folder).unwrap().to_owned(), fs::read(&path).unwrap())
+                    let name = path.strip_prefix(folder).unwrap().to_owned();
+                    files.insert(name, fs::read(&path).unwrap());
                 }
             }
         }
@@ -218,6 +219,7 @@ fn files_in(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 #[test]
+#[allow(clippy::disallowed_methods, reason = "when to kill is a matter of time")]
 fn a_solve_that_was_killed_begins_anew_and_comes_to_the_same_bytes() {
     let solve = |folder: &Path| {
         let args = "--json solve a --problem 5 --options centroid --library lib --out plan".split(' ');
