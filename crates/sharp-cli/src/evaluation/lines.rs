@@ -45,6 +45,9 @@ pub(crate) struct ResultLine {
     pub(crate) recoveries: u32,
     pub(crate) mean_sim_time_s: f64,
     pub(crate) predicted_success: f64,
+    /// More executions of a plan, to hold against what it predicted: as many as its prediction took.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) calibration: Option<Tally>,
     pub(crate) reuse: Reuse,
     pub(crate) env_steps: u64,
     pub(crate) gradient_steps: u64,
@@ -178,6 +181,7 @@ impl ResultLine {
             recoveries: 0,
             mean_sim_time_s: 25.0,
             predicted_success: 0.98,
+            calibration: None,
             variant: default_variant(),
             simulator: default_simulator(),
             decision_us: DecisionTimes::default(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
-use sharp_plan::{Plan, RunSettings, run as run_plan, write_atomic};
+use sharp_plan::{Plan, RunSettings, Tally, run as run_plan, write_atomic};
 use sharp_space::Seed;
 
 use super::machine::machine;
@@ -110,6 +110,7 @@ fn blank(job: &Job, problem: usize) -> ResultLine {
         recoveries: 0,
         mean_sim_time_s: 0.0,
         predicted_success: 0.0,
+        calibration: None,
         reuse: Reuse { uses: 0, reused: 0 },
         env_steps: 0,
         gradient_steps: 0,
@@ -141,9 +142,11 @@ fn solve_and_drive(
         report.plan_dir = Some(step.folder().display().to_string());
         write_atomic(&folder.join("solve.json"), (to_json(&report) + "\n").as_bytes())?;
         let begun = Instant::now();
-        let run = drive(&Arc::new(plan), spec, sharp, folder)?;
+        let plan = Arc::new(plan);
+        let run = drive(&plan, spec, sharp, folder)?;
         line = with_run(line, &run);
         line.time_s.drive = begun.elapsed().as_secs_f64();
+        line.calibration = Some(calibrate(&plan, spec, sharp));
     }
     Ok(Some(line))
 }
@@ -180,6 +183,18 @@ fn drive(plan: &Arc<Plan>, spec: &Spec, sharp: &SharpSpec, folder: &Path) -> Res
     let driven = run_plan(plan, &settings, &|| begun.elapsed().as_secs_f64() * 1e6);
     pictures::write(folder, "run", &pictures::plan(plan, &plan.solution.query, &driven))?;
     Ok(RunReport::new(plan, &driven))
+}
+
+/// Executions that a prediction is held against.
+const CALIBRATION_EPISODES: u32 = 1000;
+
+/// Executes the plan often enough to tell a prediction that is three points off from luck.
+fn calibrate(plan: &Arc<Plan>, spec: &Spec, sharp: &SharpSpec) -> Tally {
+    let seed = Seed(spec.seed).child("calibration", 0);
+    let mut settings = RunSettings::new(plan, CALIBRATION_EPISODES, seed);
+    settings.recovery = sharp.recovery == Switch::On;
+    let report = RunReport::new(plan, &run_plan(plan, &settings, &|| 0.0));
+    Tally { episodes: report.episodes, successes: report.successes }
 }
 
 fn with_solution(line: ResultLine, report: &SolveReport) -> ResultLine {
