@@ -146,7 +146,7 @@ impl Spec {
         // Measured on one core: docs/scale.md.
         let [small_s, large_s] = match (self.method, self.sharp.as_ref().map(|sharp| sharp.learning)) {
             (Contender::Sharp, Some(Learning::Paper)) | (Contender::Sac, _) => [self.time_limit_s; 2],
-            (Contender::Sharp, _) => [5.0, 27.0],
+            (Contender::Sharp, _) => [4.0, 17.0],
             (Contender::Rrt | Contender::RrtContact, _) => [0.7, 15.0],
             (Contender::Track, _) => [0.1, 0.5],
             (Contender::Mppi, _) => [1.0, 4.0],
