@@ -77,6 +77,7 @@ fn plan_folder(world: &World, settings: &SolveSettings, threads: usize) -> TempD
         noise: settings.noise.clone(),
         learning: settings.learn.mode,
         cost_update: settings.search.cost_update,
+        failure_cost_s: settings.learn.failure_cost_s,
         seed: settings.seed,
         solution,
     };

@@ -59,8 +59,8 @@ pub(crate) struct LegReport {
     pub(crate) cost_s: f64,
 }
 
-impl From<&PlannedLeg> for LegReport {
-    fn from(planned: &PlannedLeg) -> Self {
+impl LegReport {
+    fn new(planned: &PlannedLeg, failure_cost_s: f64) -> Self {
         let PlannedLeg { leg, learnt, reused, on_arrival } = planned;
         Self {
             option: leg.id.to_string(),
@@ -78,7 +78,7 @@ impl From<&PlannedLeg> for LegReport {
             verified: learnt.verified.into(),
             on_arrival: (*on_arrival).into(),
             length_m: leg.guide.length_m(),
-            cost_s: learnt.cost_s(),
+            cost_s: learnt.cost_s(failure_cost_s),
         }
     }
 }
@@ -168,7 +168,7 @@ impl SolveReport {
         let solution = &plan.solution;
         let (uses, reused) = solution.reuse();
         self.status = "solved";
-        self.plan = solution.legs.iter().map(LegReport::from).collect();
+        self.plan = solution.legs.iter().map(|leg| LegReport::new(leg, plan.failure_cost_s)).collect();
         self.reuse = Reuse { uses, reused };
         self.predicted = Some(Predicted {
             success: solution.predicted.rate(),

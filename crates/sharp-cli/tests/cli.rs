@@ -69,7 +69,7 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
         fs::write(folder.path().join(file), text).unwrap();
     }
     fs::write(folder.path().join("bytes.ron"), b"\xff\xfe").unwrap();
-    let cases: [(&[&str], &str, &str); 20] = [
+    let cases: [(&[&str], &str, &str); 21] = [
         (&["solve", "rooms.yaml", "--start", "2,3,0", "--goal", "6.05,1,0"], "GOAL_OCCUPIED", "goal"),
         (&["solve", "rooms.yaml", "--start", "-2,3,0", "--goal", "10,3,0"], "START_OUTSIDE_MAP", "start"),
         (&["solve", "rooms.yaml", "--start", "2,NaN,0", "--goal", "10,3,0"], "POSE_INVALID", "--start"),
@@ -82,6 +82,7 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
             "start",
         ),
         (&["solve", "a", "--problem", "9"], "PROBLEM_UNKNOWN", "1..5"),
+        (&["solve", "a", "--problem", "1", "--failure-cost", "NaN"], "USAGE", "--failure-cost is NaN"),
         (&["map", "check", "rooms.yaml", "--robot", "robot.ron"], "ROBOT_INVALID", "robot.ron"),
         (&["run", "missing"], "", "missing"),
         (&["run", "missing", "--simulator", "bullet"], "USAGE", "must be rapier2d"),
@@ -256,7 +257,9 @@ fn a_solve_that_was_killed_begins_anew_and_comes_to_the_same_bytes() {
 fn what_was_switched_off_is_named_in_report_and_plan() {
     let folder = tempfile::tempdir().unwrap();
     write_rooms(folder.path(), true);
-    let switches = ["--learning", "prior", "--cost-update", "off", "--noise", "nominal*0.5"];
+    let switches = "--learning prior --cost-update off --noise nominal*0.5 --failure-cost 50"
+        .split(' ')
+        .collect::<Vec<_>>();
     let output =
         solve_rooms(folder.path(), &[&switches[..], &["--library", "none", "--out", "plan"]].concat());
     let report = json(&output);
@@ -268,7 +271,7 @@ fn what_was_switched_off_is_named_in_report_and_plan() {
         assert_eq!((&leg["policy"], &leg["gradient_steps"]), (&"learnt".into(), &0.into()), "{leg}");
     }
     let plan = fs::read_to_string(folder.path().join("plan/plan.ron")).unwrap();
-    for line in ["learning: prior", "cost_update: false", "gain_sd: 0.1"] {
+    for line in ["learning: prior", "cost_update: false", "gain_sd: 0.1", "failure_cost_s: 50"] {
         assert!(plan.contains(line), "no {line} in {plan}");
     }
 }

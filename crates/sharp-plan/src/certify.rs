@@ -24,8 +24,8 @@ pub struct Certificate {
 
 /// Episodes that are driven before anybody asks whether to go on.
 const BLOCK: u32 = 128;
-/// What a failure costs, seconds: somebody has to walk there and free the robot.
-pub(crate) const FAILURE_S: f64 = 1000.0;
+/// What a failure usually counts for, seconds: somebody has to walk there and free the robot.
+pub const FAILURE_COST_S: f64 = 1000.0;
 
 impl Certificate {
     /// What `ends` showed: for each episode whether it succeeded, and its time in seconds.
@@ -37,11 +37,11 @@ impl Certificate {
         Self { tally, mean_time_s }
     }
 
-    /// Seconds per success, and a price for each failure.
+    /// Seconds per success, and `failure_cost_s` seconds for each failure.
     #[must_use]
-    pub fn cost_s(&self) -> f64 {
+    pub fn cost_s(&self, failure_cost_s: f64) -> f64 {
         let success = self.tally.rate().max(1e-3);
-        self.mean_time_s / success + FAILURE_S * (1.0 - success)
+        self.mean_time_s / success + failure_cost_s * (1.0 - success)
     }
 }
 

@@ -200,7 +200,7 @@ impl ComposedPolicy {
         else {
             return false;
         };
-        let cost = |id: LegId| known.get(&id).map(|planned| planned.learnt.cost_s());
+        let cost = |id: LegId| known.get(&id).map(|planned| planned.learnt.cost_s(plan.failure_cost_s));
         let Some(legs) = planner.plan(&cost, &()) else { return false };
         let cautious = Arc::new(OptionPolicy::Follower(Follower::cautious(&plan.workspace.robot)));
         self.legs = legs

@@ -8,6 +8,7 @@ use sharp_rbvd::{Rbvd, RbvdSettings};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{Cell, DistanceField, OccupancyGrid, Pose, Region, RegionId, Seed};
 
+use crate::certify::FAILURE_COST_S;
 use crate::learn::{LearningMode, Learnt};
 use crate::leg::Leg;
 use crate::percept::Workspace;
@@ -131,6 +132,7 @@ pub(crate) fn plan(kind: OptionKind) -> Arc<Plan> {
         noise: NoiseModel::none(),
         learning: LearningMode::Fast,
         cost_update: true,
+        failure_cost_s: FAILURE_COST_S,
         seed: Seed(1),
         solution,
     })

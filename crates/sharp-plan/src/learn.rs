@@ -12,7 +12,7 @@ use sharp_rl::{
 use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, Vehicle};
 use sharp_space::{Pose, Seed};
 
-use crate::certify::{Certificate, Trial};
+use crate::certify::{Certificate, FAILURE_COST_S, Trial};
 use crate::leg::Leg;
 use crate::pace::PacedFollower;
 use crate::percept::{Expectation, Tracker, Workspace};
@@ -51,6 +51,8 @@ pub struct LearnSettings {
     /// Where a plan falls short, the prior is trained on a leg on which nothing else holds as often as this;
     /// 0 for never.
     pub train_below: f64,
+    /// What a failure counts for beside the seconds of a success, seconds: the more, the safer and slower.
+    pub failure_cost_s: f64,
     /// Episodes in which candidates are compared.
     pub screening_episodes: u32,
     /// Fresh episodes that certify the chosen one.
@@ -70,6 +72,7 @@ impl LearnSettings {
                 mode,
                 wanted_success: 0.99,
                 train_below: if mode == LearningMode::Prior { 0.0 } else { 0.97 },
+                failure_cost_s: FAILURE_COST_S,
                 screening_episodes: 200,
                 certify_episodes: 1000,
                 environments: 16,
@@ -94,6 +97,7 @@ impl LearnSettings {
                 mode,
                 wanted_success: 0.99,
                 train_below: 1.0,
+                failure_cost_s: FAILURE_COST_S,
                 screening_episodes: 20,
                 certify_episodes: 1000,
                 environments: 1,
@@ -119,12 +123,12 @@ pub struct Learnt {
 }
 
 impl Learnt {
-    /// The cost that A* uses: seconds per success, and a price for each failure.
+    /// The cost that A* uses: seconds per success, and `failure_cost_s` seconds for each failure.
     ///
     /// The paper takes the mean number of steps and knows no failure.
     #[must_use]
-    pub fn cost_s(&self) -> f64 {
-        Certificate { tally: self.verified, mean_time_s: self.mean_time_s }.cost_s()
+    pub fn cost_s(&self, failure_cost_s: f64) -> f64 {
+        Certificate { tally: self.verified, mean_time_s: self.mean_time_s }.cost_s(failure_cost_s)
     }
 }
 
@@ -344,7 +348,7 @@ impl Lesson<'_> {
     fn screen(&self) -> Vec<OptionPolicy> {
         screen(self.workspace, self.noise, self.settings.screening_episodes, |policy, episodes, round| {
             let trial = self.trial(episodes, "screen", round);
-            trial.of_legs(&self.drivers(policy), &self.starts).cost_s()
+            trial.of_legs(&self.drivers(policy), &self.starts).cost_s(self.settings.failure_cost_s)
         })
     }
 
@@ -436,9 +440,10 @@ mod tests {
         let (workspace, _) = world(HALL, OptionKind::Centroid);
         let with =
             |successes| Learnt { verified: Tally { episodes: 100, successes }, ..followed(&workspace) };
-        assert_eq!(with(100).cost_s(), 5.0, "its mean time");
-        assert_eq!(with(50).cost_s(), 510.0, "twice the time and half of what a failure costs");
-        assert!(with(0).cost_s() > 2000.0, "dear beyond use");
+        assert_eq!(with(100).cost_s(1000.0), 5.0, "its mean time");
+        assert_eq!(with(50).cost_s(1000.0), 510.0, "twice the time and half of what a failure costs");
+        assert_eq!(with(50).cost_s(0.0), 10.0, "twice the time");
+        assert!(with(0).cost_s(1000.0) > 2000.0, "dear beyond use");
     }
 
     #[test]

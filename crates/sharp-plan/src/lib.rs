@@ -36,7 +36,7 @@ pub use baseline::{
     Baseline, ComparisonSettings, Driven, Host, Mppi, MppiSettings, Pilot, Readiness, RoutePlanner, Rrt, Sac,
     SacBudget, Situation, Track, compare,
 };
-pub use certify::{Certificate, Trial};
+pub use certify::{Certificate, FAILURE_COST_S, Trial};
 pub use composed::{ComposedPolicy, Decision, Events};
 pub use execute::{Episode, EpisodeEnd, RunSettings, run, success};
 pub use files::{FileError, hash, read_ron, write_atomic, write_ron};

@@ -10,6 +10,7 @@ use sharp_rbvd::{Rbvd, StateId};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{OccupancyGrid, Point, Pose, Seed};
 
+use crate::certify::FAILURE_COST_S;
 use crate::files::{self, FileError};
 use crate::learn::{LearningMode, Learnt};
 use crate::leg::{Leg, LegId};
@@ -100,6 +101,8 @@ pub struct Plan {
     pub learning: LearningMode,
     /// Whether measured costs flowed back into its search.
     pub cost_update: bool,
+    /// What a failure counted for, seconds.
+    pub failure_cost_s: f64,
     /// The seed it was made with.
     pub seed: Seed,
     /// The composed policy.
@@ -117,6 +120,8 @@ struct PlanFile {
     // Plans from before there was a choice have no such line.
     #[serde(default = "usual_cost_update")]
     cost_update: bool,
+    #[serde(default = "usual_failure_cost_s")]
+    failure_cost_s: f64,
     seed: Seed,
     start: Pose,
     goal: Pose,
@@ -127,6 +132,10 @@ struct PlanFile {
 
 const fn usual_cost_update() -> bool {
     true
+}
+
+const fn usual_failure_cost_s() -> f64 {
+    FAILURE_COST_S
 }
 
 #[derive(Serialize, Deserialize)]
@@ -161,6 +170,7 @@ impl Plan {
             noise: self.noise.clone(),
             learning: self.learning,
             cost_update: self.cost_update,
+            failure_cost_s: self.failure_cost_s,
             seed: self.seed,
             start: self.solution.query.start,
             goal: self.solution.query.goal,
@@ -203,6 +213,7 @@ impl Plan {
             noise: file.noise,
             learning: file.learning,
             cost_update: file.cost_update,
+            failure_cost_s: file.failure_cost_s,
             seed: file.seed,
             solution: Solution { query, legs, predicted, predicted_time_s },
         })

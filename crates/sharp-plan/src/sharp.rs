@@ -12,7 +12,7 @@ use sharp_rl::Progress;
 use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Seed;
 
-use crate::certify::{Certificate, FAILURE_S, Trial};
+use crate::certify::{Certificate, Trial};
 use crate::files::FileError;
 use crate::learn::{LearnSettings, LearningMode, Learnt, Lesson, LessonMonitor};
 use crate::leg::{Leg, LegId, Role};
@@ -161,9 +161,8 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Seconds per success, and a price for each failure.
-    fn cost_s(&self) -> f64 {
-        Certificate { tally: self.predicted, mean_time_s: self.predicted_time_s }.cost_s()
+    fn certificate(&self) -> Certificate {
+        Certificate { tally: self.predicted, mean_time_s: self.predicted_time_s }
     }
 
     /// Option uses and how many of them found their policy in the library.
@@ -255,7 +254,8 @@ impl Run<'_> {
             if is_weak {
                 self.charge_joins(&solution.legs);
             }
-            if best.as_ref().is_none_or(|best| solution.cost_s() < best.cost_s()) {
+            let cost_s = |solution: &Solution| self.cost_s(solution.certificate());
+            if best.as_ref().is_none_or(|best| cost_s(&solution) < cost_s(best)) {
                 best = Some(solution);
             }
             if !is_weak
@@ -273,10 +273,16 @@ impl Run<'_> {
         }
     }
 
+    /// What whatever `certificate` tells of costs here, seconds.
+    fn cost_s(&self, certificate: Certificate) -> f64 {
+        certificate.cost_s(self.settings.learn.failure_cost_s)
+    }
+
     /// The cheapest plan by all that is known by now.
     fn search(&mut self) -> Option<Vec<Arc<Leg>>> {
+        let failure_cost_s = self.settings.learn.failure_cost_s;
         let Self { planner, learnt, monitor, .. } = self;
-        let cost = |id: LegId| learnt.get(&id).map(Learnt::cost_s);
+        let cost = |id: LegId| learnt.get(&id).map(|learnt| learnt.cost_s(failure_cost_s));
         planner.plan(&cost, *monitor)
     }
 
@@ -298,7 +304,7 @@ impl Run<'_> {
             let [before, after] = pair else { continue };
             let loss = after.learnt.verified.rate() - after.on_arrival.rate();
             if after.on_arrival.episodes >= ENTERED_MIN && loss > 0.0 {
-                self.planner.charge(before.leg.id, after.leg.id, FAILURE_S * loss);
+                self.planner.charge(before.leg.id, after.leg.id, self.settings.learn.failure_cost_s * loss);
             }
         }
     }

@@ -59,7 +59,7 @@ fn entries(dir: &Path) -> Result<Vec<Entry>, Failure> {
             option: id.to_string(),
             episodes: stored.learnt.verified.episodes,
             successes: stored.learnt.verified.successes,
-            cost_s: stored.learnt.cost_s(),
+            cost_s: stored.learnt.cost_s(sharp_plan::FAILURE_COST_S),
         }));
     }
     Ok(entries)

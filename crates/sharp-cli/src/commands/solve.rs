@@ -53,6 +53,10 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     let mut stopwatch = Stopwatch::start();
     stopwatch.enter("load");
     let time_limit = args.time_limit.map(limit).transpose()?;
+    if !(args.failure_cost.is_finite() && args.failure_cost >= 0.0) {
+        let message = format!("--failure-cost is {}, expected seconds, 0 or more", args.failure_cost);
+        return Err(Failure::new("USAGE", message));
+    }
     let map = input::map(&args.map)?;
     let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
     let noise = input::noise(&args.noise)?;
@@ -68,6 +72,7 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     let abstraction = built.file.abstraction();
     let mut settings = SolveSettings::new(&workspace, args.learning.into(), noise.clone(), Seed(seed));
     settings.search.cost_update = args.cost_update == Switch::On;
+    settings.learn.failure_cost_s = args.failure_cost;
     if args.guide == Guide::Paper {
         settings.search.guide.planner = GuidePlanner::LearnAndLink;
     }
@@ -87,6 +92,7 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
         noise: noise.clone(),
         learning: args.learning.into(),
         cost_update: args.cost_update == Switch::On,
+        failure_cost_s: args.failure_cost,
         seed: Seed(seed),
         solution,
     };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
-use sharp_plan::{Plan, RunSettings, Tally, run as run_plan, write_atomic};
+use sharp_plan::{FAILURE_COST_S, Plan, RunSettings, Tally, run as run_plan, write_atomic};
 use sharp_space::Seed;
 
 use super::machine::machine;
@@ -166,6 +166,7 @@ fn solve_args(spec: &Spec, sharp: &SharpSpec, problem: usize, [library, out]: [P
         learning: sharp.learning,
         noise: spec.noise.clone(),
         cost_update: sharp.cost_update,
+        failure_cost: FAILURE_COST_S,
         guide: Guide::Ridge,
         library: Some(library.display().to_string()),
         out: Some(out),

@@ -40,7 +40,7 @@ impl Run<'_> {
                 break;
             }
             let anew = self.run_plan(legs);
-            if certificate(&anew).cost_s() >= certificate(&runs).cost_s() {
+            if self.cost_s(certificate(&anew)) >= self.cost_s(certificate(&runs)) {
                 for (leg, learnt) in legs.iter().zip(before) {
                     self.keep(leg, learnt)?;
                 }
@@ -67,7 +67,7 @@ impl Run<'_> {
                 drivers[index].policy = policy;
             }
             let runs = self.run_chain(&drivers, episodes, purpose);
-            (certificate(&runs).cost_s(), runs)
+            (self.cost_s(certificate(&runs)), runs)
         };
         let (noise, episodes) = (&self.settings.noise, self.settings.learn.screening_episodes);
         let few = screen(self.workspace, noise, episodes, |policy, episodes, round| {
@@ -76,7 +76,8 @@ impl Run<'_> {
         let driven =
             few.into_iter().map(|policy| (drive(&policy, self.settings.repair_episodes, REPAIR), policy));
         let best = driven.min_by(|a, b| a.0.0.total_cmp(&b.0.0));
-        let Some(((_, driven), policy)) = best.filter(|best| best.0.0 < certificate(runs).cost_s()) else {
+        let Some(((_, driven), policy)) = best.filter(|best| best.0.0 < self.cost_s(certificate(runs)))
+        else {
             return Ok(false);
         };
         let certify = |&index: &usize| {
