@@ -1,5 +1,8 @@
 //! What one job does: everything that decides its result, and nothing else.
 
+use std::fs;
+use std::sync::OnceLock;
+
 use serde::{Deserialize, Serialize};
 use sharp_plan::{hash, map_hash};
 
@@ -11,7 +14,7 @@ use crate::outcome::{Failure, to_json};
 /// One job: equal specifications give equal results but for times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Spec {
-    /// Version of the program.
+    /// Version and build of the program.
     pub(crate) version: String,
     pub(crate) env: String,
     pub(crate) robot: String,
@@ -119,8 +122,8 @@ impl Spec {
         let stale = |what: &str, is: &str, expected: &str| {
             Failure::new("JOB_STALE", format!("{what} is {is}, the job was planned for {expected}"))
         };
-        if self.version != env!("CARGO_PKG_VERSION") {
-            return Err(stale("version of sharp", env!("CARGO_PKG_VERSION"), &self.version));
+        if self.version != version() {
+            return Err(stale("version and build of sharp", version(), &self.version));
         }
         let regions = self.sharp.as_ref().map(|sharp| sharp.regions.as_str());
         let (is, planned) = (Inputs::read(&self.env, &self.robot, &self.noise, regions)?, &self.inputs);
@@ -156,6 +159,17 @@ impl Spec {
     }
 }
 
+/// Version and build of this program, as in `0.1.0+1f0c9a7e`: what two builds measure may differ.
+pub(crate) fn version() -> &'static str {
+    static VERSION: OnceLock<String> = OnceLock::new();
+    VERSION.get_or_init(|| {
+        let version = env!("CARGO_PKG_VERSION");
+        // The first is there even if the file was replaced meanwhile.
+        let program = fs::read("/proc/self/exe").or_else(|_| fs::read(std::env::current_exe()?));
+        program.map_or(version.to_owned(), |bytes| format!("{version}+{}", &hash(&bytes)[..8]))
+    })
+}
+
 /// How a setting is written in files.
 pub(crate) fn word(value: impl Serialize) -> String {
     to_json(&value).trim_matches('"').to_owned()
@@ -173,7 +187,7 @@ impl Spec {
             cost_update: Switch::On,
         };
         Self {
-            version: env!("CARGO_PKG_VERSION").into(),
+            version: version().into(),
             env: "a".into(),
             robot: "husky".into(),
             method: Contender::Sharp,

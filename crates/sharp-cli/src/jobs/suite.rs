@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use sharp_space::Seed;
 
-use super::spec::{Inputs, SharpSpec, Spec};
+use super::spec::{Inputs, SharpSpec, Spec, version};
 use crate::args::{Contender, Kind, Learning, Selection, Suite};
 use crate::outcome::Failure;
 
@@ -55,7 +55,7 @@ impl World<'_> {
     ) -> Spec {
         let regions = self.inputs.regions.clone().filter(|_| sharp.is_some());
         Spec {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            version: version().to_owned(),
             env: self.env.to_owned(),
             robot: self.robot.to_owned(),
             method,
