@@ -10,6 +10,7 @@ use std::sync::Arc;
 use sharp_sim::RobotState;
 use sharp_space::Point;
 
+use crate::learn::LearningMode;
 use crate::leg::{Leg, LegId};
 use crate::percept::{Percept, Tracker};
 use crate::plan::Plan;
@@ -186,7 +187,8 @@ impl ComposedPolicy {
         self.events.recoveries += 1;
         let plan = Arc::clone(&self.plan);
         let query = Query { start: self.percept.state.pose, goal: plan.solution.query.goal };
-        let settings = SearchSettings::new(&plan.workspace);
+        let passing = plan.learning != LearningMode::Paper;
+        let settings = SearchSettings { passing, ..SearchSettings::new(&plan.workspace) };
         let known: BTreeMap<LegId, &crate::sharp::PlannedLeg> = plan
             .solution
             .legs
