@@ -178,12 +178,22 @@ fn solve_args(spec: &Spec, sharp: &SharpSpec, problem: usize, [library, out]: [P
 /// Executes the plan, draws what was driven, and counts.
 fn drive(plan: &Arc<Plan>, spec: &Spec, sharp: &SharpSpec, folder: &Path) -> Result<RunReport, Failure> {
     let begun = Instant::now();
-    // Executions draw their noise from another root than learning did.
-    let mut settings = RunSettings::new(plan, spec.episodes, Seed(spec.seed).child("evaluation", 0));
-    settings.recovery = sharp.recovery == Switch::On;
+    let settings = run_settings(plan, spec, sharp, (spec.episodes, "evaluation"));
     let driven = run_plan(plan, &settings, &|| begun.elapsed().as_secs_f64() * 1e6);
     pictures::write(folder, "run", &pictures::plan(plan, &plan.solution.query, &driven))?;
     Ok(RunReport::new(plan, &driven))
+}
+
+/// So many executions; `purpose` names the root of their noise, which is never that of learning.
+fn run_settings(
+    plan: &Arc<Plan>,
+    spec: &Spec,
+    sharp: &SharpSpec,
+    (episodes, purpose): (u32, &str),
+) -> RunSettings {
+    let mut settings = RunSettings::new(plan, episodes, Seed(spec.seed).child(purpose, 0));
+    settings.recovery = sharp.recovery == Switch::On;
+    settings
 }
 
 /// Executions that a prediction is held against.
@@ -191,9 +201,7 @@ const CALIBRATION_EPISODES: u32 = 1000;
 
 /// Executes the plan often enough to tell a prediction that is three points off from luck.
 fn calibrate(plan: &Arc<Plan>, spec: &Spec, sharp: &SharpSpec) -> Tally {
-    let seed = Seed(spec.seed).child("calibration", 0);
-    let mut settings = RunSettings::new(plan, CALIBRATION_EPISODES, seed);
-    settings.recovery = sharp.recovery == Switch::On;
+    let settings = run_settings(plan, spec, sharp, (CALIBRATION_EPISODES, "calibration"));
     let report = RunReport::new(plan, &run_plan(plan, &settings, &|| 0.0));
     Tally { episodes: report.episodes, successes: report.successes }
 }
