@@ -1,4 +1,4 @@
-//! Definition 2 as a checker: slow, simple, and independent of how diagrams are built.
+//! A check of Definition 2. It is slow and simple, and shares no code with the construction of diagrams.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -9,10 +9,10 @@ use thiserror::Error;
 use crate::diagram::{CellMetric, Rbvd, StateId};
 use crate::space::FreeSpace;
 
-/// Where a diagram departs from the definition.
+/// How a diagram breaks the definition.
 #[derive(Debug, Error, PartialEq)]
 #[non_exhaustive]
-pub enum Violation {
+pub enum DefinitionViolation {
     /// A cell where the robot cannot be has a state.
     #[error("column {}, row {} has state {} but no room for the robot", cell.col, cell.row, state.0)]
     Blocked {
@@ -21,7 +21,7 @@ pub enum Violation {
         /// Its state.
         state: StateId,
     },
-    /// A cell has another state than the one it should: that of the nearest region.
+    /// A cell does not have the state of the nearest region.
     #[error("column {}, row {} has state {}, nearest is the region of state {}", cell.col, cell.row, found.0, expected.0)]
     NotNearest {
         /// The cell.
@@ -31,7 +31,7 @@ pub enum Violation {
         /// The state of the nearest region.
         expected: StateId,
     },
-    /// A state falls into pieces.
+    /// The cells of a state are not connected.
     #[error("state {} is not connected: nothing leads from its region to column {}, row {}", state.0, cell.col, cell.row)]
     Disconnected {
         /// The state.
@@ -55,8 +55,8 @@ pub enum Violation {
 /// search for each state.
 ///
 /// # Errors
-/// Returns the first departure found.
-pub fn check_definition(rbvd: &Rbvd, clearance: &DistanceField) -> Result<(), Violation> {
+/// Returns the first violation found.
+pub fn check_definition(rbvd: &Rbvd, clearance: &DistanceField) -> Result<(), DefinitionViolation> {
     let settings = rbvd.settings();
     let space = FreeSpace::new(clearance, settings.min_clearance_m);
     let fringe = FreeSpace::new(clearance, settings.fringe_clearance_m.min(settings.min_clearance_m));
@@ -65,15 +65,15 @@ pub fn check_definition(rbvd: &Rbvd, clearance: &DistanceField) -> Result<(), Vi
     check_nearest(rbvd, &space)
 }
 
-fn check_coverage(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), Violation> {
+fn check_coverage(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), DefinitionViolation> {
     for index in 0..space.frame.len() {
         let cell = space.frame.cell(index);
         match rbvd.state_of(cell) {
-            Some(state) if !space.is_free(index) => return Err(Violation::Blocked { cell, state }),
+            Some(state) if !space.is_free(index) => return Err(DefinitionViolation::Blocked { cell, state }),
             None if space.is_free(index) => {
                 let covered = |(other, _)| rbvd.state_of(space.frame.cell(other)).is_some();
                 if space.moves(index).any(covered) {
-                    return Err(Violation::Uncovered { cell });
+                    return Err(DefinitionViolation::Uncovered { cell });
                 }
             }
             _ => {}
@@ -82,7 +82,7 @@ fn check_coverage(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), Violation> {
     Ok(())
 }
 
-fn check_connected(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), Violation> {
+fn check_connected(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), DefinitionViolation> {
     let state_of = |index| rbvd.state_of(space.frame.cell(index));
     let mut seen = vec![false; space.frame.len()];
     for state in rbvd.states() {
@@ -93,13 +93,13 @@ fn check_connected(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), Violation> {
     }
     for (index, _) in seen.iter().enumerate().filter(|(_, seen)| !**seen) {
         if let Some(state) = state_of(index) {
-            return Err(Violation::Disconnected { state, cell: space.frame.cell(index) });
+            return Err(DefinitionViolation::Disconnected { state, cell: space.frame.cell(index) });
         }
     }
     Ok(())
 }
 
-fn check_nearest(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), Violation> {
+fn check_nearest(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), DefinitionViolation> {
     let frame = &space.frame;
     let is_placed = |&state: &StateId| rbvd.state_of(rbvd.region(state).representative) == Some(state);
     let mut nearest: Vec<(u64, Option<StateId>)> = vec![(u64::MAX, None); frame.len()];
@@ -121,9 +121,9 @@ fn check_nearest(rbvd: &Rbvd, space: &FreeSpace) -> Result<(), Violation> {
         let start = frame.index(rbvd.region(state).representative);
         for index in space.flood(start, &mut seen, |index| nearest[index].1 == Some(state)) {
             let (cell, expected) = (frame.cell(index), state);
-            // Cells without a state are the business of `check_coverage`.
+            // `check_coverage` looks at the cells without a state.
             if let Some(found) = rbvd.state_of(cell).filter(|&found| found != expected) {
-                return Err(Violation::NotNearest { cell, found, expected });
+                return Err(DefinitionViolation::NotNearest { cell, found, expected });
             }
         }
     }

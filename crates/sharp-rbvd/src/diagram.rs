@@ -1,7 +1,7 @@
 //! Region-based Voronoi diagram of the configuration space (Definition 2) and the abstraction α.
 //!
-//! Every free cell belongs to the state whose region is nearest along free space, so states are
-//! connected by construction, which the straight distance of the paper's letter cannot give. Ties
+//! Every free cell belongs to the state whose region is nearest along free space. So states are
+//! connected by construction; with the straight distance of the paper's text they need not be. Ties
 //! go to the lower [`RegionId`]: the diagram depends on nothing but its input.
 
 use petgraph::unionfind::UnionFind;
@@ -9,15 +9,17 @@ use serde::{Deserialize, Serialize};
 use sharp_space::{Cell, DistanceField, Footprint, GridFrame, Point, Region, RegionId};
 use thiserror::Error;
 
+use crate::abstraction::{StateAbstraction, portals_between};
 use crate::grow::grow;
 use crate::nearest::nearest_in_straight_line;
-use crate::portal::{Crossing, Portal, PortalId, crossings, find_portals};
-use crate::regions::Draft;
+use crate::portal::{Portal, PortalId, PortalSettings, crossings, portals_at};
+use crate::regions::CellAssignment;
 use crate::space::{DIAGONAL, FreeSpace, NONE};
+use crate::state_grid::{StateGrid, StateGridError};
 
 /// Names an abstract state s ∈ S and its cell ψ; equal to its region's [`RegionId`].
 ///
-/// The given regions come first, in their order; regions made up for parts of the map without any
+/// The given regions come first, in their order. Regions made up for parts of the map that have none
 /// follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -29,8 +31,8 @@ pub enum CellMetric {
     /// The one with the shortest way through free space, in moves to the eight surrounding cells.
     #[default]
     Geodesic,
-    /// The one nearest in straight line, through walls: the paper's letter. A piece cut off from
-    /// its region becomes a state of its own or, if too small, goes to the states around it.
+    /// The one nearest in a straight line, through walls, as the paper's text says. A piece cut off
+    /// from its region becomes a state of its own or, if too small, goes to the states around it.
     Euclidean,
 }
 
@@ -42,11 +44,11 @@ pub struct RbvdSettings {
     /// Clearance that the robot's centre needs to travel, metres: states grow among cells that
     /// have it, so no state leaks through a gap that the robot cannot pass.
     pub min_clearance_m: f64,
-    /// Clearance below which the robot's centre cannot be at all, metres. Cells between the two
-    /// join the nearest state once all have grown, so that α also holds where the robot may stand
-    /// but should not drive.
+    /// Clearance below which the robot's centre cannot be at all, metres. Cells with a clearance
+    /// between the two join the nearest state once all states have grown. So α is also defined where
+    /// the robot may stand but should not drive.
     pub fringe_clearance_m: f64,
-    /// Borders with less room than this join no states, metres.
+    /// Borders narrower than this join no states, metres.
     pub portal_min_width_m: f64,
     /// Parts without a region that are smaller than this stay without a state, square metres.
     pub state_min_area_m2: f64,
@@ -71,8 +73,9 @@ impl Default for RbvdSettings {
 impl RbvdSettings {
     /// Settings for a robot that keeps `margin_m` to either side, on a grid of `resolution_m`.
     ///
-    /// α is then defined at every collision-free pose in a part of the map large enough for a
-    /// state: half a cell's diagonal is what a pose can gain over its cell's centre.
+    /// α is then defined at every collision-free pose in a part of the map large enough for a state.
+    /// The fringe reaches half a cell's diagonal further, because a pose may have that much more
+    /// clearance than the centre of its cell.
     #[must_use]
     pub fn for_footprint(footprint: &Footprint, margin_m: f64, resolution_m: f64) -> Self {
         let inscribed_m = footprint.inscribed_radius_m();
@@ -85,7 +88,7 @@ impl RbvdSettings {
         }
     }
 
-    /// The paper's letter: straight distances, a robot without size, every common border counts.
+    /// As the paper's text says: straight distances, a robot without size, every common border counts.
     #[must_use]
     pub fn paper() -> Self {
         Self { metric: CellMetric::Euclidean, ..Self::default() }
@@ -96,10 +99,8 @@ impl RbvdSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "crate::store::StoredRbvd", into = "crate::store::StoredRbvd")]
 pub struct Rbvd {
-    pub(crate) frame: GridFrame,
+    pub(crate) cells: StateGrid,
     pub(crate) settings: RbvdSettings,
-    /// For each cell its state or [`NONE`].
-    pub(crate) states: Vec<u32>,
     pub(crate) regions: Vec<Region>,
     pub(crate) given_count: usize,
     pub(crate) component_count: usize,
@@ -118,8 +119,8 @@ impl Rbvd {
     ///
     /// # Errors
     /// Returns an error if a setting is negative or not finite, if a region's id is not its
-    /// position or a cell of it lies outside the grid, if the grid has more than 43 million cells,
-    /// or if no cell gets a state.
+    /// position or a cell of it lies outside the grid, if the grid has more than 43 million cells or
+    /// no sound frame, or if no cell gets a state.
     pub fn build(
         clearance: &DistanceField,
         regions: &[Region],
@@ -129,42 +130,73 @@ impl Rbvd {
         validate(&frame, regions, settings)?;
         let space = FreeSpace::new(clearance, settings.min_clearance_m);
         let states = vec![NONE; frame.len()];
-        let mut draft = Draft { clearance, space: &space, settings, regions: Vec::new(), states };
-        draft.place(regions);
+        let mut assignment =
+            CellAssignment { clearance, space: &space, settings, regions: Vec::new(), states };
+        assignment.place(regions);
         if settings.metric == CellMetric::Euclidean {
-            let nearest = nearest_in_straight_line(&space, &draft.states);
-            draft.split(&nearest);
+            let nearest = nearest_in_straight_line(&space, &assignment.states);
+            assignment.split(&nearest);
         }
-        grow(&space, &mut draft.states);
-        draft.claim_parts_without_region();
+        grow(&space, &mut assignment.states);
+        assignment.claim_parts_without_region();
 
-        let Draft { regions: all, mut states, .. } = draft;
+        let CellAssignment { regions: all, mut states, .. } = assignment;
         let crossings = crossings(&space, &states);
-        let component_count = count_components(&states, &crossings, all.len());
+        let touching = crossings.iter().map(|crossing| crossing.between);
+        let component_count = count_components(&states, touching, all.len());
         if component_count == 0 {
             return Err(RbvdError::NoRoom { min_clearance_m: settings.min_clearance_m });
         }
-        let widths = (settings.min_clearance_m, settings.portal_min_width_m);
-        let portals = find_portals(&space, clearance, &crossings, widths);
+        let portals = portals_at(&crossings, &space, clearance, &PortalSettings::of(settings));
         let fringe = FreeSpace::new(clearance, settings.fringe_clearance_m.min(settings.min_clearance_m));
         grow(&fringe, &mut states);
         Ok(Self {
-            frame,
+            cells: StateGrid::from_names(frame, states, settings.fringe_clearance_m)?,
             settings: settings.clone(),
             neighbors: neighbors(&portals, all.len()),
             given_count: regions.len(),
             free_count: (0..frame.len()).filter(|&i| fringe.is_free(i)).count(),
             regions: all,
-            states,
             component_count,
             portals,
         })
     }
 
+    /// Any abstraction as a diagram, so that it can be stored in the file format of diagrams. A
+    /// diagram gives an equal diagram.
+    ///
+    /// What other abstractions do not say is filled in: every region counts as given, the parts of the
+    /// map are those that portals join, every cell where the robot may stand counts as covered, and
+    /// the settings hold the fringe clearance and the width of the narrowest portal.
+    #[must_use]
+    pub fn from_abstraction(states: &dyn StateAbstraction) -> Self {
+        if let Some(rbvd) = states.as_rbvd() {
+            return rbvd.clone();
+        }
+        let (cells, portals, count) = (states.cells().clone(), states.portals().to_vec(), states.len());
+        let joined = portals.iter().map(|portal| (portal.between.0.0, portal.between.1.0));
+        let settings = RbvdSettings {
+            min_clearance_m: cells.fringe_clearance_m(),
+            fringe_clearance_m: cells.fringe_clearance_m(),
+            portal_min_width_m: portals.iter().map(|p| p.width_m).reduce(f64::min).unwrap_or(0.0),
+            ..RbvdSettings::default()
+        };
+        Self {
+            settings,
+            neighbors: neighbors(&portals, count),
+            given_count: count,
+            free_count: cells.names().iter().filter(|&&state| state != NONE).count(),
+            component_count: count_components(cells.names(), joined, count),
+            regions: states.regions().to_vec(),
+            cells,
+            portals,
+        }
+    }
+
     /// α: the state whose cell holds `point`, if any.
     #[must_use]
     pub fn state_at(&self, point: Point) -> Option<StateId> {
-        self.frame.cell_at(point).and_then(|cell| self.state_of(cell))
+        self.cells.state_at(point)
     }
 
     /// α: the state of `cell`, if it has one.
@@ -173,7 +205,7 @@ impl Rbvd {
     /// If `cell` lies outside the grid.
     #[must_use]
     pub fn state_of(&self, cell: Cell) -> Option<StateId> {
-        Some(self.states[self.frame.index(cell)]).filter(|&state| state != NONE).map(StateId)
+        self.cells.state_of(cell)
     }
 
     /// All states, in order.
@@ -234,16 +266,13 @@ impl Rbvd {
 
     /// The portals between two states, in whichever order they are named.
     pub fn portals_between(&self, a: StateId, b: StateId) -> impl ExactSizeIterator<Item = &Portal> {
-        let between = (a.min(b), a.max(b));
-        let first = self.portals.partition_point(|portal| portal.between < between);
-        let count = self.portals[first..].partition_point(|portal| portal.between == between);
-        self.portals[first..first + count].iter()
+        portals_between(&self.portals, a, b).iter()
     }
 
     /// The share of the cells where the robot may stand that have a state, from 0 to 1.
     #[must_use]
     pub fn covered_share(&self) -> f64 {
-        let covered = self.states.iter().filter(|&&state| state != NONE).count();
+        let covered = self.cells.names().iter().filter(|&&state| state != NONE).count();
         covered as f64 / self.free_count as f64
     }
 
@@ -256,7 +285,7 @@ impl Rbvd {
     /// Where the grid lies in the world.
     #[must_use]
     pub const fn frame(&self) -> &GridFrame {
-        &self.frame
+        self.cells.frame()
     }
 
     /// The settings it was built with.
@@ -300,6 +329,9 @@ pub enum RbvdError {
         /// Number of cells.
         cells: usize,
     },
+    /// The grid is no place in the plane.
+    #[error(transparent)]
+    Cells(#[from] StateGridError),
     /// There is no room for a state.
     #[error("no part of the map with {min_clearance_m} m of clearance has a region or the size of a state")]
     NoRoom {
@@ -337,11 +369,12 @@ fn validate(frame: &GridFrame, regions: &[Region], settings: &RbvdSettings) -> R
     Ok(())
 }
 
-/// States that touch at all lie in one part of free space: moves reach every cell of a state.
-fn count_components(states: &[u32], crossings: &[Crossing], count: usize) -> usize {
+/// The number of parts that the states with cells form, if the pairs of states in `joined` belong to
+/// one part each. States that touch do: moves reach every cell of a state.
+fn count_components(states: &[u32], joined: impl Iterator<Item = (u32, u32)>, count: usize) -> usize {
     let mut parts = UnionFind::new(count);
-    for crossing in crossings {
-        parts.union(crossing.between.0 as usize, crossing.between.1 as usize);
+    for (a, b) in joined {
+        parts.union(a as usize, b as usize);
     }
     let mut inhabited = vec![false; count];
     for &state in states.iter().filter(|&&state| state != NONE) {

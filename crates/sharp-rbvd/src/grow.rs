@@ -1,4 +1,4 @@
-//! Growth of all cells at once: Dijkstra's algorithm from every region, with buckets for a queue.
+//! Growth of all states at once: Dijkstra's algorithm from every region, with buckets as the queue.
 
 use crate::space::{DIAGONAL, FreeSpace, NONE};
 
@@ -13,7 +13,7 @@ pub(crate) fn grow(space: &FreeSpace, states: &mut [u32]) {
     let mut buckets = vec![Vec::new(); DIAGONAL as usize + 1];
     for (index, distance) in distances.iter_mut().enumerate().filter(|(i, _)| states[*i] != NONE) {
         *distance = 0;
-        // Inner cells of a source can improve nobody.
+        // A cell in the middle of a source has no neighbour to improve.
         if space.moves(index).any(|(other, _)| states[other] == NONE) {
             buckets[0].push(index as u32);
         }

@@ -3,9 +3,12 @@
 //! An [`Rbvd`] (Definition 2 of the paper) cuts the configuration space into cells, one for each
 //! critical region. Cells and abstract states share one name, the [`StateId`], so the bijection ℓ
 //! is the identity and the abstraction function α is [`Rbvd::state_at`]. Where two cells meet, a
-//! [`Portal`] says whether, where and how widely a robot can pass; two states are neighbours
+//! [`Portal`] says where a robot can cross and how wide the crossing is; two states are neighbours
 //! (V of the paper) if a portal joins them. [`check_definition`] compares a diagram with the
 //! definition, independently of how it was built.
+//!
+//! Whatever is built on states asks for the trait [`StateAbstraction`], of which the diagram is one
+//! implementation. `examples/tiles.rs` brings another, and [`conformance`] checks any of them.
 //!
 //! ```
 //! use sharp_rbvd::{Rbvd, RbvdSettings, StateId};
@@ -22,6 +25,7 @@
 //! assert_eq!(rbvd.portals()[0].width_m, 1.0);
 //! ```
 
+mod abstraction;
 mod check;
 mod diagram;
 mod grow;
@@ -29,10 +33,15 @@ mod nearest;
 mod portal;
 mod regions;
 mod space;
+mod state_grid;
 mod store;
 #[cfg(test)]
 mod tests;
 
-pub use check::{Violation, check_definition};
+pub mod conformance;
+
+pub use abstraction::{StateAbstraction, StateIds};
+pub use check::{DefinitionViolation, check_definition};
 pub use diagram::{CellMetric, Rbvd, RbvdError, RbvdSettings, StateId};
-pub use portal::{Portal, PortalId};
+pub use portal::{Portal, PortalId, PortalSettings, find_portals};
+pub use state_grid::{StateGrid, StateGridError};

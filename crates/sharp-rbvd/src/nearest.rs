@@ -1,4 +1,4 @@
-//! The diagram of the paper's letter: the nearest region by straight distance, walls or not.
+//! The nearest region by straight distance, through walls, as the paper's text defines the diagram.
 
 use crate::space::{FreeSpace, NONE};
 
@@ -9,7 +9,7 @@ struct InColumn {
     state: u32,
 }
 
-/// Gives every free cell the state whose seed is nearest in straight line; ties go to the lowest.
+/// Gives every free cell the state whose seed is nearest in a straight line; ties go to the lowest.
 ///
 /// `seeds` holds a state or [`NONE`] for each cell. Each cell looks along its row, outwards, until
 /// no farther column can win, so the time grows with the distance to the nearest seed.

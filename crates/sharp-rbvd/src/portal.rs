@@ -1,10 +1,10 @@
 //! Where two cells of the diagram meet, and whether a robot passes there.
 //!
 //! The paper's neighbourhood V asks only for a common border. Two rooms may share two doors, and a
-//! border may be too narrow for the robot, so each piece of a border that is wide enough is a
-//! [`Portal`], and neighbours are states with a portal between them. A border that runs from a
-//! corridor through a doorway into a room is connected, but its roomiest point may lie in the room,
-//! where nobody who follows the corridor goes: pieces also end where the border narrows and widens
+//! border may be too narrow for the robot. So each piece of a border that is wide enough is a
+//! [`Portal`], and two states are neighbours if a portal joins them. A border may also run from a
+//! corridor through a doorway into a room. Its widest point then lies in the room, and a robot that
+//! follows the corridor never gets there. So a piece also ends where the border narrows and widens
 //! again.
 
 use std::collections::BTreeMap;
@@ -13,8 +13,9 @@ use petgraph::unionfind::UnionFind;
 use serde::{Deserialize, Serialize};
 use sharp_space::{Cell, DistanceField, Heading, Point, Vector};
 
-use crate::diagram::StateId;
+use crate::diagram::{RbvdSettings, StateId};
 use crate::space::{FreeSpace, NONE};
+use crate::state_grid::StateGrid;
 
 /// Names a portal; equal to its position in [`Rbvd::portals`](crate::Rbvd::portals).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -39,9 +40,34 @@ pub struct Portal {
     pub cell: Cell,
     /// The direction across the border at `point`, from the lower to the higher state.
     pub normal: Heading,
-    /// Room across the direction of travel, metres: twice the clearance of `point`, but no more
-    /// than the border piece with the robot's reach added at both ends.
+    /// Free width across the direction of travel, metres: twice the clearance at `point`, but at most
+    /// the length of the border piece plus the clearance that the robot needs at both ends.
     pub width_m: f64,
+}
+
+impl Portal {
+    /// The state on the other side of `state`; `None` if the portal does not touch `state`.
+    #[must_use]
+    pub fn other_side(&self, state: StateId) -> Option<StateId> {
+        let (low, high) = self.between;
+        if state == low { Some(high) } else { (state == high).then_some(low) }
+    }
+}
+
+/// What a robot needs to pass from one state to another. The default suits a robot that is a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PortalSettings {
+    /// Clearance that the robot's centre needs to travel, metres.
+    pub min_clearance_m: f64,
+    /// Pieces of a border narrower than this are no portals, metres.
+    pub min_width_m: f64,
+}
+
+impl PortalSettings {
+    /// What the diagram with these settings asks for.
+    pub(crate) const fn of(settings: &RbvdSettings) -> Self {
+        Self { min_clearance_m: settings.min_clearance_m, min_width_m: settings.portal_min_width_m }
+    }
 }
 
 /// Two grid cells with a common side and different states.
@@ -76,48 +102,62 @@ pub(crate) fn crossings(space: &FreeSpace, states: &[u32]) -> Vec<Crossing> {
     found
 }
 
-/// The portals at least `min_width_m` wide for a robot whose centre stays `reach_m` from obstacles,
-/// sorted by their states.
-pub(crate) fn find_portals(
+/// The portals of a labelling of one's own, sorted by the states they join.
+///
+/// `clearance` is the distance field of the same grid. States meet only where both cells have the
+/// clearance that the robot needs.
+///
+/// # Panics
+/// If the two belong to grids of different sizes.
+#[must_use]
+pub fn find_portals(cells: &StateGrid, clearance: &DistanceField, settings: &PortalSettings) -> Vec<Portal> {
+    assert_eq!(cells.frame().len(), clearance.frame().len(), "states and clearance are of one map");
+    let space = FreeSpace::new(clearance, settings.min_clearance_m);
+    portals_at(&crossings(&space, cells.names()), &space, clearance, settings)
+}
+
+/// The portals among `crossings` that are wide enough, sorted by their states.
+pub(crate) fn portals_at(
+    crossings: &[Crossing],
     space: &FreeSpace,
     clearance: &DistanceField,
-    crossings: &[Crossing],
-    (reach_m, min_width_m): (f64, f64),
+    settings: &PortalSettings,
 ) -> Vec<Portal> {
     // 1 µm forgives the rounding of single-precision distances.
-    let least_m = min_width_m - 1e-6;
+    let least_m = settings.min_width_m - 1e-6;
     let borders = crossings.chunk_by(|a, b| a.between == b.between);
     let pieces = borders.flat_map(|border| pieces(space, clearance, border));
-    let portals = pieces.map(|piece| portal(space, clearance, &piece, reach_m));
+    let portals = pieces.map(|piece| portal(space, clearance, &piece, settings.min_clearance_m));
     let wide = portals.filter(|portal| portal.width_m >= least_m);
     wide.zip(0..).map(|(portal, id)| Portal { id: PortalId(id), ..portal }).collect()
 }
 
-/// Splits the border of two states into pieces that each widen towards one roomiest place.
+/// Splits the border of two states into pieces that each have one place with the most clearance.
 ///
-/// The cells are flooded from the roomiest down; two pools that meet become one unless the shallower
-/// of them is more than [`PROMINENCE_M`] roomier than the place where they meet.
+/// Cells join in the order of falling clearance. Where two pools of cells meet they become one, unless
+/// the lower of their two peaks exceeds the clearance at the meeting place by more than
+/// [`PROMINENCE_M`].
 fn pieces(space: &FreeSpace, clearance: &DistanceField, border: &[Crossing]) -> Vec<Vec<Crossing>> {
     let mut cells: Vec<usize> = border.iter().flat_map(|c| [c.cells.0, c.cells.1]).collect();
     cells.sort_unstable();
     cells.dedup();
-    let room = |vertex: usize| clearance.at(space.frame.cell(cells[vertex]));
+    let clear_m = |vertex: usize| clearance.at(space.frame.cell(cells[vertex]));
     let mut order: Vec<usize> = (0..cells.len()).collect();
-    order.sort_by(|&a, &b| room(b).total_cmp(&room(a)).then(a.cmp(&b)));
+    order.sort_by(|&a, &b| clear_m(b).total_cmp(&clear_m(a)).then(a.cmp(&b)));
 
     let mut pools = UnionFind::new(cells.len());
     let mut peak: Vec<Option<f64>> = vec![None; cells.len()];
     for &vertex in &order {
-        peak[vertex] = Some(room(vertex));
+        peak[vertex] = Some(clear_m(vertex));
         let next = space.moves(cells[vertex]).filter_map(|(other, _)| cells.binary_search(&other).ok());
         let flooded = next.filter(|&other| peak[other].is_some());
         let mut near: Vec<_> = flooded.map(|other| (peak[pools.find(other)].unwrap_or(0.0), other)).collect();
-        // The deepest pool first: it takes the cell, and shallow ones join it.
+        // The pool with the highest peak first: it takes the cell, and the others join it.
         near.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         for (index, &(_, other)) in near.iter().enumerate() {
             let pool = peak[pools.find(other)].expect("a flooded cell has a pool");
             let own = peak[pools.find(vertex)].expect("this cell is flooded");
-            if index == 0 || pool.min(own) - room(vertex) <= PROMINENCE_M {
+            if index == 0 || pool.min(own) - clear_m(vertex) <= PROMINENCE_M {
                 pools.union(vertex, other);
                 peak[pools.find(vertex)] = Some(pool.max(own));
             }
@@ -129,11 +169,12 @@ fn pieces(space: &FreeSpace, clearance: &DistanceField, border: &[Crossing]) -> 
         by_pool.entry(pools.find(vertex)).or_default().push(crossing);
     }
     let mut pieces: Vec<_> = by_pool.into_values().collect();
-    // By first crossing: the order shall not depend on how the sets were merged.
+    // Sorted by first crossing, so that the order does not depend on how the sets were merged.
     pieces.sort_unstable();
     pieces
 }
 
+/// The portal of one piece of border for a robot whose centre stays `reach_m` from obstacles.
 fn portal(space: &FreeSpace, clearance: &DistanceField, piece: &[Crossing], reach_m: f64) -> Portal {
     let frame = &space.frame;
     let place = |index| {
@@ -141,7 +182,7 @@ fn portal(space: &FreeSpace, clearance: &DistanceField, piece: &[Crossing], reac
         Vector::new(cell.col as f64 + 0.5, cell.row as f64 + 0.5)
     };
     let middle = |crossing: &Crossing| (place(crossing.cells.0) + place(crossing.cells.1)) / 2.0;
-    let room = |crossing: &Crossing| {
+    let clear_m = |crossing: &Crossing| {
         let at = |index| clearance.at(frame.cell(index));
         at(crossing.cells.0).min(at(crossing.cells.1))
     };
@@ -149,13 +190,13 @@ fn portal(space: &FreeSpace, clearance: &DistanceField, piece: &[Crossing], reac
     let best = piece
         .iter()
         .min_by(|a, b| {
-            let by_room = room(b).total_cmp(&room(a));
-            by_room.then((middle(a) - mean).norm().total_cmp(&(middle(b) - mean).norm())).then(a.cmp(b))
+            let by_clearance = clear_m(b).total_cmp(&clear_m(a));
+            by_clearance.then((middle(a) - mean).norm().total_cmp(&(middle(b) - mean).norm())).then(a.cmp(b))
         })
         .expect("a piece has at least one crossing");
 
     let across = |crossing: &Crossing| place(crossing.cells.1) - place(crossing.cells.0);
-    let (center, window) = (middle(best), room(best) / frame.resolution_m);
+    let (center, window) = (middle(best), clear_m(best) / frame.resolution_m);
     let nearby = piece.iter().filter(|crossing| (middle(crossing) - center).norm() <= window);
     // One crossing points along a grid axis; the sum over a stretch of border points across it.
     let sum: Vector = nearby.map(across).sum();
@@ -169,11 +210,11 @@ fn portal(space: &FreeSpace, clearance: &DistanceField, piece: &[Crossing], reac
         point: frame.from_grid(center),
         cell: frame.cell(best.cells.0),
         normal: Heading::new(normal.radians() + frame.origin.heading.radians()),
-        width_m: (2.0 * room(best) - frame.resolution_m).min(length_m + 2.0 * reach_m),
+        width_m: (2.0 * clear_m(best) - frame.resolution_m).min(length_m + 2.0 * reach_m),
     }
 }
 
-/// Points as `[x, y]`: nalgebra's own form would bring another dependency.
+/// Points as `[x, y]`: nalgebra's own serde support would add a dependency.
 mod coordinates {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
     use sharp_space::Point;

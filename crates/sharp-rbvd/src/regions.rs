@@ -5,8 +5,8 @@ use sharp_space::{DistanceField, Region, RegionId};
 use crate::diagram::RbvdSettings;
 use crate::space::{FreeSpace, NONE};
 
-/// A diagram in the making: the regions so far and, for each cell, its state or [`NONE`].
-pub(crate) struct Draft<'a> {
+/// A diagram under construction: the regions so far and, for each cell, its state or [`NONE`].
+pub(crate) struct CellAssignment<'a> {
     pub(crate) clearance: &'a DistanceField,
     pub(crate) space: &'a FreeSpace,
     pub(crate) settings: &'a RbvdSettings,
@@ -14,10 +14,10 @@ pub(crate) struct Draft<'a> {
     pub(crate) states: Vec<u32>,
 }
 
-impl Draft<'_> {
-    /// Puts `given` on the map, each cut down to one connected piece of free cells that no earlier
-    /// region holds: the piece with the most clearance. A region without free cells stays as it is
-    /// and gets no cell.
+impl CellAssignment<'_> {
+    /// Places the `given` regions. Each is cut down to one connected piece of free cells that no
+    /// earlier region holds: the piece with the most clearance. A region without free cells stays
+    /// as it is and gets no cell.
     pub(crate) fn place(&mut self, given: &[Region]) {
         let frame = self.space.frame;
         let mut closed = vec![true; self.states.len()];
@@ -76,9 +76,9 @@ impl Draft<'_> {
             return;
         };
         let center = whole.representative;
-        // The field has slope 1, so no cell of such a disc has too little clearance.
-        let spare_m = self.clearance.at(center) - self.settings.min_clearance_m;
-        let radius_cells = spare_m.min(self.settings.synthetic_radius_m) / frame.resolution_m;
+        // Clearance falls by at most one metre a metre, so every cell of such a disc has enough of it.
+        let margin_m = self.clearance.at(center) - self.settings.min_clearance_m;
+        let radius_cells = margin_m.min(self.settings.synthetic_radius_m) / frame.resolution_m;
         let in_disc = |index: usize| {
             let cell = frame.cell(index);
             let (dx, dy) = (cell.col.abs_diff(center.col) as f64, cell.row.abs_diff(center.row) as f64);

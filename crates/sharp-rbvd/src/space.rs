@@ -1,8 +1,8 @@
 //! The free cells of a grid and the moves between them.
 //!
-//! A move goes to one of the eight surrounding cells; a diagonal one needs both cells beside it
-//! free, because a robot that cuts a corner hits it. Hence whatever moves connect, moves along the
-//! sides of cells connect too.
+//! A move goes to one of the eight surrounding cells. A diagonal move needs both cells beside it to
+//! be free, because a robot that cuts a corner hits it. So two cells that moves connect are also
+//! connected by moves across the sides of cells.
 
 use sharp_space::{DistanceField, GridFrame};
 

@@ -1,4 +1,4 @@
-//! The form in which a diagram is stored: runs of equal cells, and nothing that can be derived.
+//! The format in which a diagram is stored: runs of equal cells, and nothing that can be derived.
 
 use serde::{Deserialize, Serialize};
 use sharp_space::{Cell, GridFrame, Region, RegionId};
@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::diagram::{Rbvd, RbvdSettings, neighbors};
 use crate::portal::{Portal, PortalId};
 use crate::space::NONE;
+use crate::state_grid::{StateGrid, StateGridError};
 
 /// The version written; a reader refuses any other.
 const VERSION: u32 = 1;
@@ -36,11 +37,11 @@ struct StoredRegion {
 
 /// Why a stored diagram was refused.
 #[derive(Debug, Error, PartialEq)]
-pub(crate) enum StoreError {
+pub(crate) enum StoredRbvdError {
     #[error("diagram has format version {0}, expected {VERSION}")]
     Version(u32),
-    #[error("diagram's frame has a resolution or an origin that is no place")]
-    Frame,
+    #[error(transparent)]
+    Cells(#[from] StateGridError),
     #[error("diagram covers {found} cells, its frame has {expected}")]
     Length { found: usize, expected: usize },
     #[error("diagram names state {state}, has {count} states")]
@@ -53,12 +54,12 @@ pub(crate) enum StoreError {
 
 impl From<Rbvd> for StoredRbvd {
     fn from(rbvd: Rbvd) -> Self {
-        let runs = rbvd.states.chunk_by(|a, b| a == b);
+        let runs = rbvd.cells.names().chunk_by(|a, b| a == b);
         let cells = runs.map(|run| (Some(run[0]).filter(|&state| state != NONE), run.len())).collect();
         Self {
             version: VERSION,
-            regions: rbvd.regions.iter().map(|region| StoredRegion::new(region, &rbvd.frame)).collect(),
-            frame: rbvd.frame,
+            regions: rbvd.regions.iter().map(|region| StoredRegion::new(region, rbvd.frame())).collect(),
+            frame: *rbvd.cells.frame(),
             settings: rbvd.settings,
             given_count: rbvd.given_count,
             component_count: rbvd.component_count,
@@ -70,28 +71,24 @@ impl From<Rbvd> for StoredRbvd {
 }
 
 impl TryFrom<StoredRbvd> for Rbvd {
-    type Error = StoreError;
+    type Error = StoredRbvdError;
 
-    fn try_from(stored: StoredRbvd) -> Result<Self, StoreError> {
+    fn try_from(stored: StoredRbvd) -> Result<Self, StoredRbvdError> {
         if stored.version != VERSION {
-            return Err(StoreError::Version(stored.version));
-        }
-        let resolution_m = stored.frame.resolution_m;
-        if !(resolution_m.is_finite() && resolution_m > 0.0 && stored.frame.origin.is_finite()) {
-            return Err(StoreError::Frame);
+            return Err(StoredRbvdError::Version(stored.version));
         }
         let states = stored.states()?;
+        let cells = StateGrid::from_names(stored.frame, states, stored.settings.fringe_clearance_m)?;
         stored.check_portals()?;
         let (frame, count) = (stored.frame, stored.regions.len());
         let regions = stored.regions.iter().enumerate();
         let regions = regions
-            .map(|(position, region)| region.restore(position, &frame).ok_or(StoreError::Region(position)))
-            .collect::<Result<Vec<Region>, StoreError>>()?;
+            .map(|(position, region)| region.restore(position, &frame).ok_or(StoredRbvdError::Region(position)))
+            .collect::<Result<Vec<Region>, StoredRbvdError>>()?;
         Ok(Self {
             neighbors: neighbors(&stored.portals, count),
-            frame,
+            cells,
             settings: stored.settings,
-            states,
             regions,
             given_count: stored.given_count,
             component_count: stored.component_count,
@@ -103,22 +100,22 @@ impl TryFrom<StoredRbvd> for Rbvd {
 
 impl StoredRbvd {
     /// The state of each cell; lengths are checked before memory is asked for.
-    fn states(&self) -> Result<Vec<u32>, StoreError> {
+    fn states(&self) -> Result<Vec<u32>, StoredRbvdError> {
         let lengths = self.cells.iter().map(|run| run.1);
         let found = lengths.fold(0, usize::saturating_add);
         let expected = self.frame.width.saturating_mul(self.frame.height);
         if found != expected {
-            return Err(StoreError::Length { found, expected });
+            return Err(StoredRbvdError::Length { found, expected });
         }
         let count = self.regions.len();
         if let Some(state) = self.cells.iter().filter_map(|run| run.0).find(|&s| s as usize >= count) {
-            return Err(StoreError::State { state, count });
+            return Err(StoredRbvdError::State { state, count });
         }
         let runs = self.cells.iter().map(|&(state, length)| (state.unwrap_or(NONE), length));
         Ok(runs.flat_map(|(state, length)| std::iter::repeat_n(state, length)).collect())
     }
 
-    fn check_portals(&self) -> Result<(), StoreError> {
+    fn check_portals(&self) -> Result<(), StoredRbvdError> {
         let (frame, count) = (&self.frame, self.regions.len());
         for (position, portal) in self.portals.iter().enumerate() {
             let (low, high) = portal.between;
@@ -126,10 +123,10 @@ impl StoredRbvd {
                 && low < high
                 && (position == 0 || self.portals[position - 1].between <= portal.between);
             if !in_order || portal.cell.col >= frame.width || portal.cell.row >= frame.height {
-                return Err(StoreError::Portal(position));
+                return Err(StoredRbvdError::Portal(position));
             }
             if high.0 as usize >= count {
-                return Err(StoreError::State { state: high.0, count });
+                return Err(StoredRbvdError::State { state: high.0, count });
             }
         }
         Ok(())

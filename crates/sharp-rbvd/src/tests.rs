@@ -1,14 +1,16 @@
 //! Diagrams of drawn maps, and what holds for every map.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
-use arbtest::arbitrary::{Result as Drawn, Unstructured};
+use arbtest::arbitrary::{Result as Arbitrary, Unstructured};
 use expect_test::{Expect, expect};
 use sharp_space::{
     Cell, CollisionChecker, DistanceField, Footprint, FootprintChecker, GridFrame, Heading, Occupancy,
     OccupancyGrid, Point, Pose, Region, RegionId, Vector,
 };
 
+use crate::conformance::check_abstraction;
 use crate::*;
 
 /// Reads a map on which letters and digits mark the regions 0, 1, … in their order.
@@ -81,7 +83,7 @@ fn a_corridor_splits_between_two_rooms_and_the_tie_goes_to_the_first() {
 }
 
 #[test]
-fn ways_lead_around_walls_but_straight_distances_do_not() {
+fn geodesic_distances_go_around_walls_but_straight_ones_do_not() {
     let drawing = "
         ###########
         #A#.......#
@@ -201,7 +203,7 @@ fn narrow_borders_join_no_states() {
 }
 
 #[test]
-fn parts_without_region_get_one_of_their_own_if_they_are_large() {
+fn large_parts_without_a_region_get_one() {
     let settings = RbvdSettings { state_min_area_m2: 3.0, ..RbvdSettings::default() };
     let rbvd = check(
         "
@@ -248,7 +250,7 @@ fn a_gap_too_narrow_for_the_robot_stops_growth_but_not_alpha() {
 }
 
 #[test]
-fn a_region_across_a_wall_keeps_its_roomier_piece() {
+fn a_region_across_a_wall_keeps_the_piece_with_more_clearance() {
     let rbvd = check(
         "
         ..#......
@@ -278,7 +280,7 @@ fn overlapping_and_buried_regions_keep_their_ids() {
 }
 
 #[test]
-fn normals_cross_the_border_not_the_grid() {
+fn normals_point_across_the_border_whatever_the_grid() {
     let resolution_m = 0.1;
     for angle in [0.0, 0.4, 1.2, 2.5, -2.0] {
         let origin = Pose::new(3.0, -1.0, 0.3);
@@ -319,12 +321,12 @@ fn broken_input_is_refused_with_the_culprit() {
 }
 
 /// A random map of rectangles with up to five random regions.
-fn any_scene(u: &mut Unstructured<'_>) -> Drawn<(OccupancyGrid, Vec<Region>)> {
+fn any_scene(u: &mut Unstructured<'_>) -> Arbitrary<(OccupancyGrid, Vec<Region>)> {
     let (width, height) = (u.int_in_range(4..=28)?, u.int_in_range(4..=28)?);
     let origin = Pose::new(-1.0, 2.0, 0.5);
     let frame = GridFrame { origin, resolution_m: 0.25, width, height };
     let mut cells = vec![Occupancy::Free; frame.len()];
-    let rectangle = |u: &mut Unstructured<'_>, reach: usize| -> Drawn<Vec<Cell>> {
+    let rectangle = |u: &mut Unstructured<'_>, reach: usize| -> Arbitrary<Vec<Cell>> {
         let (col, row) = (u.choose_index(width)?, u.choose_index(height)?);
         let (right, top) = (u.int_in_range(0..=reach)?, u.int_in_range(0..=reach)?);
         let cols = col..(col + right + 1).min(width);
@@ -342,7 +344,7 @@ fn any_scene(u: &mut Unstructured<'_>) -> Drawn<(OccupancyGrid, Vec<Region>)> {
     Ok((grid, regions))
 }
 
-fn any_settings(u: &mut Unstructured<'_>) -> Drawn<RbvdSettings> {
+fn any_settings(u: &mut Unstructured<'_>) -> Arbitrary<RbvdSettings> {
     Ok(RbvdSettings {
         metric: if u.ratio(1, 3)? { CellMetric::Euclidean } else { CellMetric::Geodesic },
         min_clearance_m: f64::from(u.int_in_range(0..=3_u8)?) * 0.25,
@@ -368,7 +370,99 @@ fn diagrams_of_random_maps_satisfy_the_definition() {
 }
 
 #[test]
-fn the_checker_finds_what_is_wrong() {
+fn diagrams_of_random_maps_are_state_abstractions() {
+    arbtest::arbtest(|u| {
+        let (grid, regions) = any_scene(u)?;
+        let (settings, field) = (any_settings(u)?, DistanceField::new(&grid));
+        let Ok(rbvd) = Rbvd::build(&field, &regions, &settings) else { return Ok(()) };
+        if let Err(violation) = check_abstraction(&rbvd) {
+            panic!("{violation}\n{settings:?}\n{regions:?}\n{grid}\n{}", draw(&rbvd, &grid));
+        }
+        let shared: Arc<dyn StateAbstraction> = Arc::new(rbvd.clone());
+        assert_eq!(check_abstraction(&shared), Ok(()), "behind a shared pointer");
+        assert_eq!(Rbvd::from_abstraction(&shared), rbvd, "a diagram stays what it is");
+        Ok(())
+    });
+}
+
+/// The tables of a diagram, and nothing else that a diagram knows.
+#[derive(Debug)]
+struct Tables(StateGrid, Vec<Region>, Vec<Portal>);
+
+impl StateAbstraction for Tables {
+    fn cells(&self) -> &StateGrid {
+        &self.0
+    }
+
+    fn regions(&self) -> &[Region] {
+        &self.1
+    }
+
+    fn portals(&self) -> &[Portal] {
+        &self.2
+    }
+}
+
+fn tables(drawing: &str) -> (Tables, Rbvd) {
+    let (rbvd, _) = build(drawing, &RbvdSettings::default());
+    (Tables(rbvd.cells().clone(), rbvd.regions().to_vec(), rbvd.portals().to_vec()), rbvd)
+}
+
+#[test]
+fn any_abstraction_can_be_stored_as_a_diagram() {
+    let (tables, rbvd) = tables(
+        "
+        .....#...#...
+        ..A.....B#.C.
+        .....#...#...",
+    );
+    assert_eq!(check_abstraction(&tables), Ok(()));
+    let stored = Rbvd::from_abstraction(&tables);
+    assert_eq!(check_abstraction(&stored), Ok(()));
+    assert_eq!(stored.component_count(), 2, "the last room has no door");
+    for state in rbvd.states() {
+        assert_eq!(StateAbstraction::neighbors(&tables, state), rbvd.neighbors(state), "{state:?}");
+        assert_eq!(stored.neighbors(state), rbvd.neighbors(state), "{state:?}");
+    }
+    let text = ron::to_string(&stored).unwrap();
+    assert_eq!(ron::from_str::<Rbvd>(&text), Ok(stored));
+}
+
+#[test]
+fn portals_of_a_labelling_of_ones_own_are_those_of_the_diagram() {
+    let (grid, regions) = scene(1.0, "..A..#..B..\n...........\n.....#.....");
+    let field = DistanceField::new(&grid);
+    let rbvd = Rbvd::build(&field, &regions, &RbvdSettings::default()).unwrap();
+    assert_eq!(find_portals(rbvd.cells(), &field, &PortalSettings::default()), rbvd.portals());
+    let wide = PortalSettings { min_width_m: 9.0, ..PortalSettings::default() };
+    assert_eq!(find_portals(rbvd.cells(), &field, &wide), [], "no border is as wide as this");
+}
+
+#[test]
+fn the_conformance_check_finds_what_is_wrong() {
+    let spoilt = |spoil: &dyn Fn(&mut Tables)| {
+        let (mut tables, _) = tables("#########\n#A.....B#\n#########");
+        spoil(&mut tables);
+        check_abstraction(&tables).unwrap_err().to_string()
+    };
+    let cell = |tables: &mut Tables, col, state| {
+        let index = tables.0.frame().index(Cell::new(col, 1));
+        tables.0.names_mut()[index] = state;
+    };
+    assert_eq!(spoilt(&|t| cell(t, 3, 7)), "state 7 is named but there are 2 states");
+    assert_eq!(spoilt(&|t| cell(t, 1, 1)), "centre of the region of state 0 lies in Some(StateId(1))");
+    let message = "state 0 is not connected: column 3, row 1 is cut off from its region";
+    assert_eq!(spoilt(&|t| cell(t, 2, u32::MAX)), message);
+    assert_eq!(spoilt(&|t| t.1[1].id = RegionId(0)), "region at position 1 is called 0");
+    let message = "region of state 0 is empty, leaves the grid or has a representative outside itself";
+    assert_eq!(spoilt(&|t| t.1[0].cells.clear()), message);
+    assert_eq!(spoilt(&|t| t.2[0].between.1 = StateId(0)), "portal at position 0 is out of order");
+    assert_eq!(spoilt(&|t| t.2[0].point.x += 1.0), "portal 0 does not lie on the border of its states");
+    assert_eq!(spoilt(&|t| t.2[0].width_m = f64::NAN), "portal 0 has no sound width or direction");
+}
+
+#[test]
+fn the_definition_check_finds_what_is_wrong() {
     let drawing = "
         #########
         #A.....B#
@@ -377,7 +471,8 @@ fn the_checker_finds_what_is_wrong() {
     let field = DistanceField::new(&grid);
     let spoilt = |col, row, state| {
         let mut rbvd = sound.clone();
-        rbvd.states[rbvd.frame.index(Cell::new(col, row))] = state;
+        let index = rbvd.frame().index(Cell::new(col, row));
+        rbvd.cells.names_mut()[index] = state;
         check_definition(&rbvd, &field).unwrap_err().to_string()
     };
     assert_eq!(spoilt(0, 0, 1), "column 0, row 0 has state 1 but no room for the robot");
