@@ -2,10 +2,10 @@
 //! start and end.
 //!
 //! Both are balls of radius t cut down to one or two states, so one type serves for both. Headings
-//! do not matter: a set of positions is what the paper's definitions give.
+//! do not matter: the paper's definitions give sets of positions.
 
 use serde::{Deserialize, Serialize};
-use sharp_rbvd::{Portal, PortalId, Rbvd, StateId};
+use sharp_rbvd::{Portal, PortalId, StateAbstraction, StateId};
 use sharp_space::{Cell, Heading, Point};
 
 use crate::set::OptionSettings;
@@ -22,6 +22,8 @@ pub enum EndpointSite {
     Centroid(StateId),
     /// A portal between two states.
     Interface(PortalId),
+    /// A place that somebody else's family of options chose, by a number of that family's own.
+    Custom(u32),
 }
 
 /// A set of positions { x | α(x) ∈ states ∧ d(x, center) < radius }.
@@ -29,11 +31,11 @@ pub enum EndpointSite {
 pub struct Endpoint {
     /// What it lies around.
     pub site: EndpointSite,
-    /// The middle of the ball: the region's representative, or the portal's point.
+    /// The middle of the ball: for ours the region's representative or the portal's point.
     pub center: Point,
     /// Radius of the ball, metres: t of the definitions, or less where obstacles are near.
     pub radius_m: f64,
-    /// The states whose cells belong: one at a centroid, two at an interface, sorted.
+    /// The states whose cells belong to the set, sorted: one at a centroid, two at an interface.
     pub states: Vec<StateId>,
     /// The direction across an interface, from the lower state to the higher one.
     pub normal: Option<Heading>,
@@ -45,50 +47,68 @@ impl Endpoint {
     /// # Panics
     /// If there is no such state.
     #[must_use]
-    pub fn at_centroid(rbvd: &Rbvd, state: StateId, settings: &OptionSettings) -> Self {
-        let center = rbvd.region(state).center(rbvd.frame());
+    pub fn at_centroid(states: &dyn StateAbstraction, state: StateId, settings: &OptionSettings) -> Self {
+        let center = states.center(state);
         Self {
             site: EndpointSite::Centroid(state),
             center,
-            radius_m: radius_m(rbvd, center, settings),
+            radius_m: radius_m(states, center, settings),
             states: vec![state],
             normal: None,
         }
     }
 
     /// The interface region of one portal (Definition 5). A pair of states has one for each of its
-    /// portals: the definition's point p is any point of the border, ours is the roomiest.
+    /// portals. The definition's p is any point of the border; ours is the one with the most clearance.
     #[must_use]
-    pub fn at_interface(rbvd: &Rbvd, portal: &Portal, settings: &OptionSettings) -> Self {
+    pub fn at_interface(states: &dyn StateAbstraction, portal: &Portal, settings: &OptionSettings) -> Self {
         Self {
             site: EndpointSite::Interface(portal.id),
             center: portal.point,
-            radius_m: radius_m(rbvd, portal.point, settings),
+            radius_m: radius_m(states, portal.point, settings),
             states: vec![portal.between.0, portal.between.1],
             normal: Some(portal.normal),
         }
     }
 
+    /// The positions around `center` in its own state, for a family of one's own that calls the place
+    /// `number`; `None` if `center` has no state.
+    #[must_use]
+    pub fn at_point(
+        states: &dyn StateAbstraction,
+        number: u32,
+        center: Point,
+        settings: &OptionSettings,
+    ) -> Option<Self> {
+        states.state_at(center).map(|state| Self {
+            site: EndpointSite::Custom(number),
+            center,
+            radius_m: radius_m(states, center, settings),
+            states: vec![state],
+            normal: None,
+        })
+    }
+
     /// Returns true if `point` belongs to the set.
     #[must_use]
-    pub fn contains(&self, point: Point, rbvd: &Rbvd) -> bool {
+    pub fn contains(&self, point: Point, states: &dyn StateAbstraction) -> bool {
         (point - self.center).norm() < self.radius_m
-            && rbvd.state_at(point).is_some_and(|state| self.states.contains(&state))
+            && states.state_at(point).is_some_and(|state| self.states.contains(&state))
     }
 }
 
-/// t, reduced to the room around `center` so that no ball reaches through a wall, but not below
-/// the least radius.
-fn radius_m(rbvd: &Rbvd, center: Point, settings: &OptionSettings) -> f64 {
-    let frame = rbvd.frame();
+/// t, reduced to the distance between `center` and the next obstacle so that no ball reaches through a
+/// wall, but not below the least radius.
+fn radius_m(states: &dyn StateAbstraction, center: Point, settings: &OptionSettings) -> f64 {
+    let frame = states.frame();
     let reach = (settings.endpoint_radius_m / frame.resolution_m).ceil() as usize;
     let Some(middle) = frame.cell_at(center) else { return settings.endpoint_radius_min_m };
     let around = |at: usize, len: usize| at.saturating_sub(reach)..(at + reach + 1).min(len);
     let (cols, rows) = (around(middle.col, frame.width), around(middle.row, frame.height));
     let cells = rows.flat_map(|row| cols.clone().map(move |col| Cell::new(col, row)));
-    let without_state = cells.filter(|&cell| rbvd.state_of(cell).is_none());
+    let without_state = cells.filter(|&cell| states.state_of(cell).is_none());
     let nearest_m = without_state.map(|cell| (frame.center(cell) - center).norm());
-    // A cell without state lies about the fringe's clearance away from what blocks the robot.
-    let room_m = nearest_m.fold(f64::INFINITY, f64::min) + rbvd.settings().fringe_clearance_m;
-    settings.endpoint_radius_m.min(room_m).max(settings.endpoint_radius_min_m)
+    // Cells without a state end about the fringe's clearance away from what blocks the robot.
+    let clear_m = nearest_m.fold(f64::INFINITY, f64::min) + states.cells().fringe_clearance_m();
+    settings.endpoint_radius_m.min(clear_m).max(settings.endpoint_radius_min_m)
 }

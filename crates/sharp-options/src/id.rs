@@ -1,4 +1,4 @@
-//! Names of options that last: they depend on the diagram only, not on the order of synthesis.
+//! Names of options. They depend on the states only, not on the order of synthesis, so they last.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sharp_rbvd::StateId;
 use thiserror::Error;
 
-/// The two families of options.
+/// The kinds of options: the paper's two, and whatever somebody else's family makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OptionKind {
@@ -15,12 +15,27 @@ pub enum OptionKind {
     Centroid,
     /// From one interface of a state, across the state, to another (`O_i`).
     Interface,
+    /// Options of a family from outside this library.
+    Custom,
+}
+
+impl OptionKind {
+    /// Its name in files and messages.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Centroid => "centroid",
+            Self::Interface => "interface",
+            Self::Custom => "custom",
+        }
+    }
 }
 
 /// Names an option `o_ij` or `o_ijk`.
 ///
-/// Written and serialised as `c:3-7`, `c:3-7-9` or `i:3-7-9`. If a pair of states shares several portals,
-/// `@` and the portals' positions among those of their pairs follow: `i:3-7-9@0.1`.
+/// Written and serialised as `c:3-7` (centroid), `c:3-7-9` (bypass) or `i:3-7-9` (interface). If a pair
+/// of states shares several portals, `@` and the portals' positions among those of their pairs follow:
+/// `i:3-7-9@0.1`. An option of a family from outside is written like `w:3-7#0`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum OptionId {
@@ -31,9 +46,9 @@ pub enum OptionId {
         /// The state j it enters.
         to: StateId,
     },
-    /// From the centroid of i to that of k through j, whose centroid it passes by: where that lies
-    /// aside, a robot that cannot turn on the spot could not go on from it. The paper has none.
-    Passing {
+    /// From the centroid of i to that of k, past the centroid of j. If the centroid of j lies to the
+    /// side, a robot that cannot turn on the spot could not go on from it. The paper has none.
+    Bypass {
         /// The state i it leaves.
         from: StateId,
         /// The state j it crosses.
@@ -53,6 +68,17 @@ pub enum OptionId {
         /// there is only one of each.
         portals: Option<(u32, u32)>,
     },
+    /// An option of a family from outside this library.
+    Custom {
+        /// The family's letter, from `a` to `z` but neither `c` nor `i`.
+        family: char,
+        /// The state it leaves.
+        from: StateId,
+        /// The state it enters.
+        to: StateId,
+        /// Tells the options of the family between the same two states apart.
+        number: u32,
+    },
 }
 
 impl OptionId {
@@ -60,8 +86,9 @@ impl OptionId {
     #[must_use]
     pub const fn kind(self) -> OptionKind {
         match self {
-            Self::Centroid { .. } | Self::Passing { .. } => OptionKind::Centroid,
+            Self::Centroid { .. } | Self::Bypass { .. } => OptionKind::Centroid,
             Self::Interface { .. } => OptionKind::Interface,
+            Self::Custom { .. } => OptionKind::Custom,
         }
     }
 
@@ -69,7 +96,10 @@ impl OptionId {
     #[must_use]
     pub const fn from(self) -> StateId {
         match self {
-            Self::Centroid { from, .. } | Self::Passing { from, .. } | Self::Interface { from, .. } => from,
+            Self::Centroid { from, .. }
+            | Self::Bypass { from, .. }
+            | Self::Interface { from, .. }
+            | Self::Custom { from, .. } => from,
         }
     }
 
@@ -77,8 +107,8 @@ impl OptionId {
     #[must_use]
     pub const fn through(self) -> Option<StateId> {
         match self {
-            Self::Centroid { .. } => None,
-            Self::Passing { through, .. } | Self::Interface { through, .. } => Some(through),
+            Self::Centroid { .. } | Self::Custom { .. } => None,
+            Self::Bypass { through, .. } | Self::Interface { through, .. } => Some(through),
         }
     }
 
@@ -86,8 +116,30 @@ impl OptionId {
     #[must_use]
     pub const fn to(self) -> StateId {
         match self {
-            Self::Centroid { to, .. } | Self::Passing { to, .. } | Self::Interface { to, .. } => to,
+            Self::Centroid { to, .. }
+            | Self::Bypass { to, .. }
+            | Self::Interface { to, .. }
+            | Self::Custom { to, .. } => to,
         }
+    }
+
+    /// The state that a robot is in, or about to enter, when it may begin the option: i of `o_ij`, but
+    /// j of `o_ijk`, since an interface option begins on the border from i to j.
+    ///
+    /// An option can follow another if it begins at the endpoint where the other ends, and leaves the
+    /// state that the other enters.
+    #[must_use]
+    pub const fn leaves(self) -> StateId {
+        match self {
+            Self::Interface { through, .. } => through,
+            Self::Centroid { from, .. } | Self::Bypass { from, .. } | Self::Custom { from, .. } => from,
+        }
+    }
+
+    /// The state that a robot is in, or about to enter, when the option ends: j of `o_ij`, k of `o_ijk`.
+    #[must_use]
+    pub const fn enters(self) -> StateId {
+        self.to()
     }
 }
 
@@ -95,11 +147,12 @@ impl fmt::Display for OptionId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Centroid { from, to } => write!(f, "c:{}-{}", from.0, to.0),
-            Self::Passing { from, through, to } => write!(f, "c:{}-{}-{}", from.0, through.0, to.0),
+            Self::Bypass { from, through, to } => write!(f, "c:{}-{}-{}", from.0, through.0, to.0),
             Self::Interface { from, through, to, portals } => {
                 write!(f, "i:{}-{}-{}", from.0, through.0, to.0)?;
                 portals.map_or(Ok(()), |(entry, exit)| write!(f, "@{entry}.{exit}"))
             }
+            Self::Custom { family, from, to, number } => write!(f, "{family}:{}-{}#{number}", from.0, to.0),
         }
     }
 }
@@ -107,7 +160,8 @@ impl fmt::Display for OptionId {
 /// A text that names no option.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
-    "{0:?} names no option, expected c:FROM-TO, c:FROM-THROUGH-TO, i:FROM-THROUGH-TO or i:FROM-THROUGH-TO@ENTRY.EXIT"
+    "{0:?} names no option, expected c:FROM-TO, c:FROM-THROUGH-TO, i:FROM-THROUGH-TO, \
+     i:FROM-THROUGH-TO@ENTRY.EXIT or LETTER:FROM-TO#NUMBER"
 )]
 pub struct OptionIdError(pub String);
 
@@ -115,7 +169,7 @@ impl FromStr for OptionId {
     type Err = OptionIdError;
 
     fn from_str(text: &str) -> Result<Self, OptionIdError> {
-        // Whatever is not the one way to write an id, such as `c:03-7`, is refused.
+        // Each id has one text. Another way to write it, such as `c:03-7`, is refused.
         parse(text).filter(|id| id.to_string() == text).ok_or_else(|| OptionIdError(text.to_owned()))
     }
 }
@@ -136,6 +190,9 @@ impl From<OptionId> for String {
 
 fn parse(text: &str) -> Option<OptionId> {
     let (kind, rest) = text.split_once(':')?;
+    if let Some((states, number)) = rest.split_once('#') {
+        return parse_custom(kind, states, number);
+    }
     let (states, portals) = rest.split_once('@').map_or((rest, None), |(s, p)| (s, Some(p)));
     let portals = match portals.map(|text| text.split_once('.')) {
         None => None,
@@ -146,13 +203,25 @@ fn parse(text: &str) -> Option<OptionId> {
         ("c", &[from, to], None) if from != to => Some(OptionId::Centroid { from, to }),
         (kind, &[from, through, to], portals) if from != through && through != to && from != to => {
             match (kind, portals) {
-                ("c", None) => Some(OptionId::Passing { from, through, to }),
+                ("c", None) => Some(OptionId::Bypass { from, through, to }),
                 ("i", portals) => Some(OptionId::Interface { from, through, to, portals }),
                 _ => None,
             }
         }
         _ => None,
     }
+}
+
+fn parse_custom(kind: &str, states: &str, number: &str) -> Option<OptionId> {
+    let family = kind.parse().ok().filter(|&letter| is_custom_letter(letter))?;
+    let (from, to) = states.split_once('-')?;
+    let [from, to] = [from.parse().ok().map(StateId)?, to.parse().ok().map(StateId)?];
+    Some(OptionId::Custom { family, from, to, number: number.parse().ok()? })
+}
+
+/// Returns true if a family from outside may use `letter`.
+pub(crate) const fn is_custom_letter(letter: char) -> bool {
+    letter.is_ascii_lowercase() && !matches!(letter, 'c' | 'i')
 }
 
 #[cfg(test)]
@@ -164,10 +233,16 @@ mod tests {
         arbtest::arbtest(|u| {
             let [from, through, to] =
                 [0, 1, 2].map(|i| StateId(u.arbitrary::<u32>().unwrap_or(i) / 3 * 3 + i));
-            let id = match u.int_in_range(0..=2)? {
+            let id = match u.int_in_range(0..=3)? {
                 0 => OptionId::Centroid { from, to },
-                1 => OptionId::Passing { from, through, to },
-                _ => OptionId::Interface { from, through, to, portals: u.arbitrary()? },
+                1 => OptionId::Bypass { from, through, to },
+                2 => OptionId::Interface { from, through, to, portals: u.arbitrary()? },
+                _ => OptionId::Custom {
+                    family: *u.choose(&['a', 'b', 'w', 'z'])?,
+                    from,
+                    to: *u.choose(&[from, to])?,
+                    number: u.arbitrary()?,
+                },
             };
             assert_eq!(id.to_string().parse(), Ok(id), "{id}");
             let stored = ron::to_string(&id).unwrap();
@@ -175,6 +250,27 @@ mod tests {
             assert_eq!(ron::from_str(&stored), Ok(id), "{id}");
             Ok(())
         });
+    }
+
+    #[test]
+    fn options_of_other_families_come_last() {
+        let mut ids: Vec<OptionId> =
+            ["a:0-1#0", "i:0-1-2", "c:9-8-7", "c:3-4"].iter().map(|text| text.parse().unwrap()).collect();
+        ids.sort_unstable();
+        let names: Vec<String> = ids.iter().map(ToString::to_string).collect();
+        assert_eq!(names, ["c:3-4", "c:9-8-7", "i:0-1-2", "a:0-1#0"]);
+    }
+
+    #[test]
+    fn an_option_leaves_the_state_where_it_begins_and_enters_the_one_where_it_ends() {
+        let ends = |text: &str| {
+            let id: OptionId = text.parse().unwrap();
+            [id.leaves().0, id.enters().0]
+        };
+        assert_eq!(ends("c:3-7"), [3, 7]);
+        assert_eq!(ends("c:3-7-9"), [3, 9]);
+        assert_eq!(ends("i:3-7-9"), [7, 9], "it begins on the border to 7");
+        assert_eq!(ends("w:3-7#0"), [3, 7]);
     }
 
     #[test]
@@ -193,6 +289,14 @@ mod tests {
             "x:1-2",
             "c:-1-2",
             "c:3-7 ",
+            "c:3-7#0",
+            "i:3-7#0",
+            "W:3-7#0",
+            "w:3-7#",
+            "w:3-7#00",
+            "w:3-7-9#0",
+            "w:3-7",
+            "ww:3-7#0",
         ];
         let more =
             ["i:3-7", "i:3-7-3", "i:3-3-7", "i:1-2-3@", "i:1-2-3@0", "i:1-2-3@0.1.2", "i:1-2-4294967296"];

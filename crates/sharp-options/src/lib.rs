@@ -1,11 +1,13 @@
 //! Option endpoints: where an option starts and where it ends.
 //!
-//! From a diagram's states and portals an [`OptionSet`] synthesises all centroid options `O_c` or
-//! all interface options `O_i` of the paper. Each [`OptionSpec`] names two [`Endpoint`]s, the
-//! initiation set I and the termination set β; what happens between them is learned elsewhere.
-//! Endpoints are shared: where one option ends, the next begins (`β_i = I_{i+1}`), which is what
-//! lets learned options be composed. An [`OptionId`] is stable text such as `i:3-7-9`, so that a
-//! policy learned today is found again tomorrow.
+//! From the states and portals of an abstraction an [`OptionFamily`] makes an [`OptionSet`]: all
+//! centroid options `O_c` or all interface options `O_i` of the paper, or options of one's own. Each
+//! [`OptionSpec`] names two [`Endpoint`]s, the initiation set I and the termination set β; what
+//! happens between them is learned elsewhere. Endpoints are shared: where one option ends, the next
+//! begins (`β_i = I_{i+1}`), so learned options can be composed. An [`OptionId`] is stable text such
+//! as `i:3-7-9`, so that a stored policy is found again later.
+//!
+//! `examples/two_steps.rs` is a family from outside, and [`conformance`] checks any family.
 //!
 //! ```
 //! use sharp_options::{OptionKind, OptionSet, OptionSettings};
@@ -26,14 +28,22 @@
 //! assert_eq!(names(OptionKind::Interface), ["i:0-1-2", "i:2-1-0"]);
 //! ```
 
+mod bypass;
 mod centroid;
 mod endpoint;
+mod family;
 mod id;
 mod interface;
 mod set;
 #[cfg(test)]
 mod tests;
 
+pub mod conformance;
+
+pub use bypass::BypassOptions;
+pub use centroid::CentroidOptions;
 pub use endpoint::{Endpoint, EndpointId, EndpointSite};
+pub use family::OptionFamily;
 pub use id::{OptionId, OptionIdError, OptionKind};
-pub use set::{AllowedRule, OptionSet, OptionSettings, OptionSpec};
+pub use interface::InterfaceOptions;
+pub use set::{AllowedRule, OptionSet, OptionSetError, OptionSettings, OptionSpec};

@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 
 use expect_test::{Expect, expect};
-use sharp_rbvd::{Rbvd, RbvdSettings, StateId};
+use sharp_rbvd::{Rbvd, RbvdSettings, StateAbstraction, StateId};
 use sharp_space::{Cell, DistanceField, Occupancy, OccupancyGrid, Point, Region, RegionId};
 
+use crate::conformance::{check_family, check_set};
 use crate::*;
 
 /// Reads a map, cells of half a metre, on which digits mark the regions 0, 1, … in their order.
@@ -59,18 +60,18 @@ fn centroid_options_join_neighbours_both_ways() {
 }
 
 #[test]
-fn a_centroid_is_passed_by_on_the_way_between_states_that_are_no_neighbours() {
-    let passing = |kind| {
+fn bypass_options_lead_past_a_centroid_between_states_that_are_not_neighbours() {
+    let bypasses = |kind| {
         let set = options(&diagram(ROOMS_ON_A_CORRIDOR), kind);
-        for option in set.passing() {
+        for option in set.bypasses() {
             assert_eq!(set.get(option.id), Some(option), "found by name");
-            assert!(!set.options().contains(option), "{} is none of the paper's", option.id);
+            assert!(!set.options().contains(option), "{} is not one of the paper's options", option.id);
             assert_eq!(AllowedRule::Code.states(option.id).count(), 3, "{} crosses a state", option.id);
         }
-        set.passing().iter().map(|option| option.id.to_string()).collect::<Vec<_>>().join(" ")
+        set.bypasses().iter().map(|option| option.id.to_string()).collect::<Vec<_>>().join(" ")
     };
-    assert_eq!(passing(OptionKind::Centroid), "c:0-1-2 c:2-1-0");
-    assert_eq!(passing(OptionKind::Interface), "", "an interface has no centroid to pass");
+    assert_eq!(bypasses(OptionKind::Centroid), "c:0-1-2 c:2-1-0");
+    assert_eq!(bypasses(OptionKind::Interface), "", "interface options need no bypass");
 }
 
 #[test]
@@ -148,7 +149,7 @@ fn draw(rbvd: &Rbvd, holds: impl Fn(Point) -> bool) -> String {
 }
 
 #[test]
-fn endpoints_are_balls_cut_down_to_their_states_and_to_the_room_around() {
+fn endpoints_are_balls_within_their_states_that_reach_through_no_wall() {
     let rbvd = diagram(
         "
         ...............
@@ -273,6 +274,100 @@ fn along_adjacent_states_each_option_ends_where_the_next_starts() {
         }
         Ok(())
     });
+}
+
+#[test]
+fn every_family_keeps_its_promises_on_random_maps() {
+    arbtest::arbtest(|u| {
+        let Some(rbvd) = any_diagram(u)? else { return Ok(()) };
+        let families: [&dyn OptionFamily; 3] = [&CentroidOptions, &InterfaceOptions, &BypassOptions];
+        for family in families {
+            let checked = check_family(family, &rbvd, &OptionSettings::default());
+            assert_eq!(checked, Ok(()), "{}", family.name());
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn a_set_of_kind_custom_is_empty_unless_somebody_fills_it() {
+    let set = options(&diagram(ROOMS_ON_A_CORRIDOR), OptionKind::Custom);
+    assert_eq!((set.kind(), set.options(), set.endpoints()), (OptionKind::Custom, &[][..], &[][..]));
+}
+
+#[test]
+fn bypass_options_are_a_family_too() {
+    let rbvd = diagram(ROOMS_ON_A_CORRIDOR);
+    let set = BypassOptions.synthesize(&rbvd, &OptionSettings::default());
+    assert_eq!(set.options(), options(&rbvd, OptionKind::Centroid).bypasses());
+}
+
+#[test]
+fn broken_sets_are_refused_with_the_culprit() {
+    let rbvd = diagram(ROOMS_ON_A_CORRIDOR);
+    let endpoints = options(&rbvd, OptionKind::Centroid).endpoints().to_vec();
+    let option = |text: &str, termination| OptionSpec {
+        id: text.parse().unwrap(),
+        initiation: EndpointId(0),
+        termination: EndpointId(termination),
+    };
+    let refused = |kind, options: &[OptionSpec]| {
+        OptionSet::new(kind, endpoints.clone(), options.to_vec()).unwrap_err().to_string()
+    };
+    let (centroid, own) = (OptionKind::Centroid, option("w:0-1#0", 1));
+    assert_eq!(refused(centroid, &[option("c:0-1", 7)]), "option c:0-1 names endpoint 7, which there is not");
+    assert_eq!(refused(centroid, &[own]), "option w:0-1#0 is no centroid option");
+    assert_eq!(refused(OptionKind::Custom, &[own, own]), "option w:0-1#0 is there twice");
+    let id = OptionId::Custom { family: 'C', from: StateId(0), to: StateId(1), number: 0 };
+    let message = "family letter is 'C', expected one from a to z but neither c nor i";
+    assert_eq!(refused(OptionKind::Custom, &[OptionSpec { id, ..own }]), message);
+    let mut flat = endpoints.clone();
+    flat[1].radius_m = 0.0;
+    let message = "endpoint 1 needs a finite center, a positive radius and at least one state";
+    assert_eq!(OptionSet::new(centroid, flat, Vec::new()).unwrap_err().to_string(), message);
+    let set = OptionSet::new(OptionKind::Custom, endpoints.clone(), vec![own]).unwrap();
+    let unknown = set.with_crossed("w:1-0#0".parse().unwrap(), Vec::new()).unwrap_err();
+    assert_eq!(unknown.to_string(), "there is no option w:1-0#0");
+}
+
+/// A family that breaks a promise: it gives its centroid set a second endpoint at the same place.
+#[derive(Debug)]
+struct Doubled;
+
+impl OptionFamily for Doubled {
+    fn name(&self) -> &str {
+        "doubled"
+    }
+
+    fn synthesize(&self, states: &dyn StateAbstraction, settings: &OptionSettings) -> OptionSet {
+        let set = CentroidOptions.synthesize(states, settings);
+        let (mut endpoints, mut options) = (set.endpoints().to_vec(), set.options().to_vec());
+        endpoints.push(endpoints[0].clone());
+        options[0].initiation = EndpointId(endpoints.len() as u32 - 1);
+        OptionSet::new(OptionKind::Centroid, endpoints, options).expect("the parts are sound")
+    }
+}
+
+#[test]
+fn the_conformance_check_finds_what_is_wrong() {
+    let rbvd = diagram(ROOMS_ON_A_CORRIDOR);
+    let found = check_family(&Doubled, &rbvd, &OptionSettings::default()).unwrap_err().to_string();
+    assert_eq!(found, "endpoints 0 and 3 lie at one place, Centroid(StateId(0)), but are not shared");
+    let spoilt = |spoil: &dyn Fn(&mut Vec<Endpoint>, &mut Vec<OptionSpec>)| {
+        let set = options(&rbvd, OptionKind::Centroid);
+        let (mut endpoints, mut options) = (set.endpoints().to_vec(), set.options().to_vec());
+        spoil(&mut endpoints, &mut options);
+        let set = OptionSet::new(OptionKind::Centroid, endpoints, options).unwrap();
+        check_set(&set, &rbvd).unwrap_err().to_string()
+    };
+    let message = "endpoint 1 names state 9, which there is not";
+    assert_eq!(spoilt(&|endpoints, _| endpoints[1].states = vec![StateId(9)]), message);
+    let message = "endpoint 1 does not contain its own center";
+    assert_eq!(spoilt(&|endpoints, _| endpoints[1].states = vec![StateId(0)]), message);
+    let message = "option c:0-1 leaves state 0 but begins at endpoint 2, which does not touch it";
+    assert_eq!(spoilt(&|_, options| options[0].initiation = EndpointId(2)), message);
+    let message = "option c:0-1 enters state 1 but ends at endpoint 2, which does not touch it";
+    assert_eq!(spoilt(&|_, options| options[0].termination = EndpointId(2)), message);
 }
 
 #[test]

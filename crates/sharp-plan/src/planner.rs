@@ -200,7 +200,7 @@ impl<'a> Planner<'a> {
     }
 
     fn cost(&self, leg: &Candidate, measured: Option<f64>) -> f64 {
-        if !self.settings.passing && matches!(leg.id, LegId::Option(OptionId::Passing { .. })) {
+        if !self.settings.passing && matches!(leg.id, LegId::Option(OptionId::Bypass { .. })) {
             return f64::INFINITY;
         }
         let straight_m = (leg.end - leg.start).norm();

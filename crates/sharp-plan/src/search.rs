@@ -60,10 +60,10 @@ impl OptionGraph {
                 entering.entry((endpoint, to)).or_default().push(node);
             }
         }
-        let all = || options.options().iter().chain(options.passing());
+        let all = || options.options().iter().chain(options.bypasses());
         for spec in all() {
             let node = this.add(option_candidate(options, spec));
-            entering.entry((spec.termination, entered(spec))).or_default().push(node);
+            entering.entry((spec.termination, spec.enters())).or_default().push(node);
         }
         for candidate in last_legs(rbvd, options, goal) {
             let (endpoint, from) = (candidate.endpoint, candidate.from);
@@ -74,7 +74,7 @@ impl OptionGraph {
         }
         for spec in all() {
             let node = this.nodes[&LegId::Option(spec.id)];
-            for &before in entering.get(&(spec.initiation, left(spec))).into_iter().flatten() {
+            for &before in entering.get(&(spec.initiation, spec.leaves())).into_iter().flatten() {
                 if !goes_back(this.graph[before].as_ref(), spec) {
                     this.graph.add_edge(before, node, ());
                 }
@@ -127,19 +127,6 @@ impl OptionGraph {
     }
 }
 
-/// The state that a robot is about to enter at the end of `spec`.
-fn entered(spec: &OptionSpec) -> StateId {
-    spec.id.to()
-}
-
-/// The state in which a robot that may begin `spec` is about to be.
-fn left(spec: &OptionSpec) -> StateId {
-    match spec.id.kind() {
-        OptionKind::Centroid => spec.id.from(),
-        OptionKind::Interface => spec.id.through().unwrap_or(spec.id.from()),
-    }
-}
-
 /// A centroid option back to where the one before came from never helps.
 fn goes_back(before: Option<&Candidate>, spec: &OptionSpec) -> bool {
     let came_from = before.filter(|before| matches!(before.id, LegId::Option(_))).map(|before| before.from);
@@ -151,7 +138,7 @@ fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
         id: LegId::Option(spec.id),
         from: spec.id.from(),
         to: spec.id.to(),
-        is_shortcut: matches!(spec.id, OptionId::Passing { .. }),
+        is_shortcut: matches!(spec.id, OptionId::Bypass { .. }),
         start: options.endpoint(spec.initiation).center,
         end: options.endpoint(spec.termination).center,
         endpoint: Some(spec.termination),
@@ -219,7 +206,7 @@ fn last_legs(rbvd: &Rbvd, options: &OptionSet, goal: (Pose, StateId)) -> Vec<Can
 fn endpoints_near(rbvd: &Rbvd, options: &OptionSet, state: StateId) -> Vec<EndpointId> {
     let is_near = |endpoint: &Endpoint| match endpoint.site {
         EndpointSite::Centroid(other) => other == state || rbvd.neighbors(state).contains(&other),
-        EndpointSite::Interface(_) => endpoint.states.contains(&state),
+        EndpointSite::Interface(_) | EndpointSite::Custom(_) => endpoint.states.contains(&state),
     };
     let numbered = options.endpoints().iter().zip(0..);
     numbered.filter(|(endpoint, _)| is_near(endpoint)).map(|(_, index)| EndpointId(index)).collect()

@@ -400,10 +400,7 @@ fn tallies(runs: &[ChainRun], legs: usize) -> Vec<Tally> {
 /// The letter that names a kind of option in files and flags.
 #[must_use]
 pub const fn kind_name(kind: OptionKind) -> &'static str {
-    match kind {
-        OptionKind::Centroid => "centroid",
-        OptionKind::Interface => "interface",
-    }
+    kind.name()
 }
 
 #[cfg(test)]
