@@ -23,11 +23,21 @@ pub trait CollisionChecker {
     }
 }
 
-impl<C: CollisionChecker + ?Sized> CollisionChecker for &C {
-    fn is_free(&self, pose: Pose) -> bool {
-        (**self).is_free(pose)
-    }
+macro_rules! forward {
+    ($($pointer:ty),*) => {$(
+        impl<C: CollisionChecker + ?Sized> CollisionChecker for $pointer {
+            fn is_free(&self, pose: Pose) -> bool {
+                (**self).is_free(pose)
+            }
+
+            fn is_segment_free(&self, from: Pose, to: Pose, step_m: f64) -> bool {
+                (**self).is_segment_free(from, to, step_m)
+            }
+        }
+    )*};
 }
+
+forward!(&C, Box<C>, Arc<C>);
 
 /// Exact test of a rectangle against the blocked cells of a grid.
 ///

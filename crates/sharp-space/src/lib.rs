@@ -17,20 +17,25 @@
 mod ascii;
 mod bounds;
 mod collision;
+mod detector;
 mod distance_field;
 mod footprint;
+mod geometry;
 mod grid;
 mod pose;
 mod region;
 mod seed;
 
+pub mod conformance;
 pub mod floorplan;
 pub mod trig;
 
 pub use bounds::Bounds;
 pub use collision::{CollisionChecker, FootprintChecker};
+pub use detector::{Detection, RegionDetector};
 pub use distance_field::DistanceField;
 pub use footprint::{Footprint, FootprintError};
+pub use geometry::RobotGeometry;
 pub use grid::{Cell, GridError, GridFrame, Occupancy, OccupancyGrid};
 pub use pose::{Heading, Point, Pose, Vector, wrap_angle};
 pub use region::{Region, RegionId};
