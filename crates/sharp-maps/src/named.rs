@@ -13,8 +13,8 @@ macro_rules! environments {
     ($($letter:literal)*) => {
         [$((
             $letter,
-            include_str!(concat!("../../../assets/maps/", $letter, ".ron")),
-            include_str!(concat!("../../../assets/maps/", $letter, ".problems.ron")),
+            include_str!(concat!("../assets/", $letter, ".ron")),
+            include_str!(concat!("../assets/", $letter, ".problems.ron")),
         )),*]
     };
 }

@@ -92,25 +92,25 @@ impl NoiseModel {
     /// A perfect robot on a perfect floor.
     #[must_use]
     pub fn none() -> Self {
-        Self::built_in(include_str!("../../../assets/noise/none.ron"))
+        Self::built_in(include_str!("../assets/noise/none.ron"))
     }
 
     /// What options are learnt and certified with.
     #[must_use]
     pub fn nominal() -> Self {
-        Self::built_in(include_str!("../../../assets/noise/nominal.ron"))
+        Self::built_in(include_str!("../assets/noise/nominal.ron"))
     }
 
     /// About twice the nominal noise.
     #[must_use]
     pub fn harsh() -> Self {
-        Self::built_in(include_str!("../../../assets/noise/harsh.ron"))
+        Self::built_in(include_str!("../assets/noise/harsh.ron"))
     }
 
     /// A constant pull, patches of slippery floor and a delay: noise whose mean is not zero.
     #[must_use]
     pub fn biased() -> Self {
-        Self::built_in(include_str!("../../../assets/noise/biased.ron"))
+        Self::built_in(include_str!("../assets/noise/biased.ron"))
     }
 
     /// One of [`NAMES`](Self::NAMES), or one of them [scaled](Self::scaled): `nominal*2`, `harsh*0.5`.
@@ -417,7 +417,7 @@ mod tests {
     }
 
     fn refuse(from: &str, to: &str, message: &str) {
-        let text = include_str!("../../../assets/noise/biased.ron");
+        let text = include_str!("../assets/noise/biased.ron");
         let changed = text.replace(from, to);
         assert_ne!(text, changed, "the test changes nothing: {from}");
         let error = NoiseModel::from_ron(&changed).expect_err(to).to_string();

@@ -1,6 +1,6 @@
 //! Robots as data: the outline, the wheels and the limits of a robot of the paper's evaluation.
 //!
-//! A robot is a RON file (`assets/robots`); nothing else in the project knows one by name. The
+//! A robot is a RON file (`assets/robots` of this crate); nothing else in the project knows one by name. The
 //! reference point is the centre of the footprint, which is also the middle between the axles.
 
 use serde::{Deserialize, Serialize};
@@ -109,14 +109,14 @@ impl RobotModel {
     /// The Clearpath Husky of the paper: moves ahead and rotates in place.
     #[must_use]
     pub fn husky() -> Self {
-        Self::from_ron(include_str!("../../../assets/robots/husky.ron"))
+        Self::from_ron(include_str!("../assets/robots/husky.ron"))
             .expect("the built-in husky is valid, as a test shows")
     }
 
     /// The Limo of the paper, a small car: moves ahead and steers.
     #[must_use]
     pub fn limo() -> Self {
-        Self::from_ron(include_str!("../../../assets/robots/limo.ron"))
+        Self::from_ron(include_str!("../assets/robots/limo.ron"))
             .expect("the built-in limo is valid, as a test shows")
     }
 
@@ -224,8 +224,8 @@ impl RobotModel {
 mod tests {
     use super::*;
 
-    const HUSKY: &str = include_str!("../../../assets/robots/husky.ron");
-    const LIMO: &str = include_str!("../../../assets/robots/limo.ron");
+    const HUSKY: &str = include_str!("../assets/robots/husky.ron");
+    const LIMO: &str = include_str!("../assets/robots/limo.ron");
 
     #[test]
     fn the_built_in_robots_are_those_of_the_paper() {

@@ -790,4 +790,43 @@ mod tests {
         }
         assert_ne!(map(FloorplanKind::Rooms, 1), map(FloorplanKind::Rooms, 2), "seeds 1 and 2");
     }
+
+    #[test]
+    fn every_kind_draws_the_maps_it_always_drew() {
+        // FNV-1a over the cells of three maps.
+        let hash = |kind| {
+            let cells = (0..3).flat_map(|seed| map(kind, seed).cells().to_vec());
+            cells.fold(0xcbf2_9ce4_8422_2325_u64, |hash, cell| {
+                (hash ^ u64::from(cell == Occupancy::Free)).wrapping_mul(0x0100_0000_01b3)
+            })
+        };
+        let found: Vec<String> =
+            FloorplanKind::ALL.into_iter().map(|kind| format!("{kind:?} {:016x}", hash(kind))).collect();
+        assert_eq!(found, HASHES);
+    }
+
+    const HASHES: [&str; 22] = [
+        "Gap 4e3606043313aaa1",
+        "Gaps 296bc741a1885731",
+        "Screens f863f2ad8e933526",
+        "OffsetWalls 22d5ae8ee114e234",
+        "Bricks 7969bbf4bd37abc4",
+        "Comb 729c8c5bf2e03374",
+        "Maze 6d9a2d189ddb8b0e",
+        "Rooms d008db658aa77531",
+        "FurnishedRooms 91b4c5a0c8c364f6",
+        "RoomsAndCorridor 3f56c82aa0d45233",
+        "CrossCorridors 1cd6a360cd9002a9",
+        "RingCorridor 388314c688e08a91",
+        "RoomGrid 8f5c675ac046ad5b",
+        "Clutter e391cd3ed68a2340",
+        "Pillars 050f79c65c5dbf87",
+        "Islands 9330f7d5d94388da",
+        "Spiral 03e878d5bf9378ed",
+        "Slanted 7809e580eb7fb741",
+        "Channel 2774e98d7d6d0da1",
+        "Funnels 4d0b18212b37e7a8",
+        "RoomsAndClutter 9788702a21208eef",
+        "BentCorridor e87545a5cfaec327",
+    ];
 }

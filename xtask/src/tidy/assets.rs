@@ -3,24 +3,34 @@
 use super::{Problem, quoted};
 use crate::tree::Tree;
 
-const INDEX: &str = "assets/README.md";
-
-/// Checks that `assets/README.md` names each file below `assets/`, in backticks, by its path from
-/// there; a `*` in a name stands for anything but a slash.
+/// Checks that the `README.md` of each `assets` folder, at the root and in crates, names every file below it,
+/// in backticks, by its path from there; a `*` in a name stands for anything but a slash.
 pub(super) fn check(tree: &Tree) -> Vec<Problem> {
-    let Some(index) = tree.files.get(INDEX) else {
-        return vec![Problem::new(INDEX, 1, "is missing: it lists every asset with its origin")];
+    let mut problems = Vec::new();
+    for (path, _) in tree.matching("", "") {
+        let Some((folder, from_there)) = split(path) else { continue };
+        let index = format!("{folder}README.md");
+        if path == index {
+            continue;
+        }
+        let names = tree.files.get(&index).into_iter().flat_map(|text| text.lines().flat_map(quoted));
+        if !names.into_iter().any(|name| matches(name, from_there)) {
+            problems.push(Problem::new(path, 1, format!("is not listed in {index}")));
+        }
+    }
+    problems
+}
+
+/// The folder `assets/` that holds `path`, and the path from there.
+fn split(path: &str) -> Option<(&str, &str)> {
+    let at = if path.starts_with("assets/") {
+        0
+    } else {
+        let inside = path.strip_prefix("crates/")?;
+        let name = inside.find('/')?;
+        inside[name..].starts_with("/assets/").then_some("crates/".len() + name + 1)?
     };
-    let names: Vec<&str> = index.lines().flat_map(quoted).collect();
-    let assets = tree.matching("assets/", "").map(|(path, _)| path).filter(|path| *path != INDEX);
-    let is_listed = |path: &str| {
-        let from_here = path.strip_prefix("assets/").unwrap_or(path);
-        names.iter().any(|name| matches(name, from_here) || matches(name, path))
-    };
-    assets
-        .filter(|path| !is_listed(path))
-        .map(|path| Problem::new(path, 1, format!("is not listed in {INDEX}")))
-        .collect()
+    Some(path.split_at(at + "assets/".len()))
 }
 
 /// Returns true if `pattern` describes `path`.
@@ -55,12 +65,23 @@ mod tests {
     #[test]
     fn unlisted_assets_are_named() {
         let tree = Tree::of(&[
-            (INDEX, "| `maps/*.ron` | drawn |\n| `robots/husky.ron` | data sheet |"),
+            ("assets/README.md", "| `maps/*.ron` | drawn |"),
             ("assets/maps/a.ron", ""),
-            ("assets/robots/husky.ron", ""),
-            ("assets/robots/limo.ron", ""),
+            ("assets/models/net", ""),
+            ("crates/sharp-sim/assets/README.md", "| `robots/husky.ron` | data sheet |"),
+            ("crates/sharp-sim/assets/robots/husky.ron", ""),
+            ("crates/sharp-sim/assets/robots/limo.ron", ""),
+            ("crates/sharp-maps/assets/a.ron", ""),
+            ("crates/sharp-maps/src/assets/mod.rs", ""),
         ]);
         let problems: Vec<String> = check(&tree).iter().map(ToString::to_string).collect();
-        assert_eq!(problems, ["assets/robots/limo.ron:1: is not listed in assets/README.md"]);
+        assert_eq!(
+            problems,
+            [
+                "assets/models/net:1: is not listed in assets/README.md",
+                "crates/sharp-maps/assets/a.ron:1: is not listed in crates/sharp-maps/assets/README.md",
+                "crates/sharp-sim/assets/robots/limo.ron:1: is not listed in crates/sharp-sim/assets/README.md",
+            ]
+        );
     }
 }
