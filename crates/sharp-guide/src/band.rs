@@ -1,18 +1,18 @@
 //! Smoothing of a path as an elastic band (Quinlan and Khatib 1993) with bending stiffness.
 //!
-//! The band minimises tension, bending and the lack of room, from coarse to fine: on a coarse band
+//! The band minimises tension, bending and the lack of clearance, from coarse to fine: on a coarse band
 //! far ends feel each other within few rounds, and each finer level only adds detail.
 
 use sharp_space::Vector;
 
-use crate::floor::Floor;
+use crate::traversable::TraversableMask;
 
 /// The spacing of the coarsest band, metres; also the length of a straight end.
 pub(crate) const COARSE_M: f64 = 0.4;
 /// Rounds on each level; every level halves the spacing.
 const ROUNDS: [usize; 3] = [200, 60, 30];
 /// Each move goes this much beyond its balance: over-relaxation, which settles several times sooner.
-const HASTE: f64 = 1.6;
+const OVER_RELAXATION: f64 = 1.6;
 
 /// How the band behaves.
 #[derive(Clone, Copy, Debug)]
@@ -25,10 +25,10 @@ pub(crate) struct BandSettings<'a> {
     pub(crate) discs: &'a [(Vector, f64)],
 }
 
-/// Smooths the polyline `draft` (units of cells); both ends stay.
-pub(crate) fn smooth(floor: &Floor<'_>, draft: &[Vector], settings: &BandSettings<'_>) -> Vec<Vector> {
-    let resolution = floor.frame().resolution_m;
-    let mut points = resample(draft, COARSE_M / resolution, 4);
+/// Smooths the polyline `attempt` (units of cells); both ends stay.
+pub(crate) fn smooth(mask: &TraversableMask<'_>, attempt: &[Vector], settings: &BandSettings<'_>) -> Vec<Vector> {
+    let resolution = mask.frame().resolution_m;
+    let mut points = resample(attempt, COARSE_M / resolution, 4);
     let coarse = step_length(&points);
     let last = points.len() - 1;
     let mut fixed = [1, 1];
@@ -51,7 +51,7 @@ pub(crate) fn smooth(floor: &Floor<'_>, draft: &[Vector], settings: &BandSetting
         let force = Force::new(settings, spacing, resolution);
         let tethers = tethers(&points, settings.discs);
         for _ in 0..rounds {
-            relax(floor, &mut points, fixed, &force);
+            relax(mask, &mut points, fixed, &force);
             for &(index, (center, radius)) in &tethers {
                 let off = points[index] - center;
                 points[index] = center + off.cap_magnitude(radius);
@@ -79,7 +79,7 @@ struct Force {
 
 impl Force {
     /// For unit tension: bending weighs (stiffness / spacing)², and a curvature of `pull` times the
-    /// lack of room is in balance.
+    /// lack of clearance is in balance.
     fn new(settings: &BandSettings<'_>, spacing: f64, resolution_m: f64) -> Self {
         let spacing_m = spacing * resolution_m;
         let bending = (settings.stiffness_m / spacing_m).powi(2);
@@ -89,7 +89,7 @@ impl Force {
 }
 
 /// One round over the free points, in place.
-fn relax(floor: &Floor<'_>, points: &mut [Vector], fixed: [usize; 2], force: &Force) {
+fn relax(mask: &TraversableMask<'_>, points: &mut [Vector], fixed: [usize; 2], force: &Force) {
     let last = points.len() - 1;
     for i in fixed[0]..=last - fixed[1] {
         let (before, here, after) = (points[i - 1], points[i], points[i + 1]);
@@ -99,12 +99,12 @@ fn relax(floor: &Floor<'_>, points: &mut [Vector], fixed: [usize; 2], force: &Fo
         let left = if i >= 2 { second(points[i - 2], before, here) } else { Vector::zeros() };
         let right = if i + 2 <= last { second(here, after, points[i + 2]) } else { Vector::zeros() };
         let bending = tension * 2.0 - left - right;
-        let (room_m, gradient) = floor.room_and_gradient(here);
-        let lack = (floor.comfort_m - room_m).max(0.0) / force.resolution_m;
+        let (clearance_m, gradient) = mask.clearance_and_gradient(here);
+        let lack = (mask.comfort_m - clearance_m).max(0.0) / force.resolution_m;
         let step = (tension + bending * force.bending + gradient * (lack * force.pull)) / force.inertia;
-        let moved = here + step * HASTE;
+        let moved = here + step * OVER_RELAXATION;
         // A point that lies in a closed cell must be able to leave it.
-        if floor.is_open_at(moved) || !floor.is_open_at(here) {
+        if mask.is_open_at(moved) || !mask.is_open_at(here) {
             points[i] = moved;
         }
     }
@@ -174,10 +174,10 @@ mod tests {
         let row = ".".repeat(80);
         let grid = OccupancyGrid::from_ascii(0.1, &[row.as_str(); 60].join("\n")).unwrap();
         let field = DistanceField::new(&grid);
-        let floor = Floor { field: &field, allowed: &|_| true, least_m: 0.1, comfort_m: 0.5 };
-        let draft = [(20.0, 30.0), (40.0, 40.0), (60.0, 30.0)].map(|(x, y)| Vector::new(x, y));
+        let mask = TraversableMask { field: &field, allowed: &|_| true, least_m: 0.1, comfort_m: 0.5 };
+        let attempt = [(20.0, 30.0), (40.0, 40.0), (60.0, 30.0)].map(|(x, y)| Vector::new(x, y));
         let settings = BandSettings { pull_per_m2: 12.0, stiffness_m: 0.6, ends: [None, None], discs: &[] };
-        let points = smooth(&floor, &draft, &settings);
+        let points = smooth(&mask, &attempt, &settings);
         let off = points.iter().map(|p| (p.y - 30.0).abs()).fold(0.0, f64::max);
         assert!(off < 0.5, "still {off} cells off the straight");
     }
@@ -187,11 +187,11 @@ mod tests {
         let row = ".".repeat(80);
         let grid = OccupancyGrid::from_ascii(0.1, &[row.as_str(); 60].join("\n")).unwrap();
         let field = DistanceField::new(&grid);
-        let floor = Floor { field: &field, allowed: &|_| true, least_m: 0.1, comfort_m: 0.5 };
-        let draft = [(20.0, 30.0), (60.0, 30.0)].map(|(x, y)| Vector::new(x, y));
+        let mask = TraversableMask { field: &field, allowed: &|_| true, least_m: 0.1, comfort_m: 0.5 };
+        let attempt = [(20.0, 30.0), (60.0, 30.0)].map(|(x, y)| Vector::new(x, y));
         let up = Some(Vector::new(1.0, 1.0).normalize());
         let settings = BandSettings { pull_per_m2: 12.0, stiffness_m: 0.6, ends: [up, up], discs: &[] };
-        let points = smooth(&floor, &draft, &settings);
+        let points = smooth(&mask, &attempt, &settings);
         let turn = |a: Vector, b: Vector| a.angle(&b);
         for pair in points.windows(3) {
             let bend = turn(pair[1] - pair[0], pair[2] - pair[1]);

@@ -1,40 +1,52 @@
-//! Option guides: guide paths and pseudo-rewards (paper, section "Synthesizing and using Option Guides").
+//! Option guides: guide paths, rewards and guided options (paper, section "Synthesizing and using Option Guides").
 //!
-//! [`plan_guide`] draws a [`GuidePath`] between the endpoints of an option, through the cells that
-//! the option may use, and certifies it with the robot's whole outline. [`PseudoReward`] is the
-//! paper's reward along it, [`ShapedReward`] the one that learns faster.
+//! The nouns: a [`GuidePath`] leads from one endpoint of an option to the other (definition 8). A [`GuidePlanner`]
+//! plans it through the cells that the option may use, for the robot's whole outline. A [`Reward`] pays a learner:
+//! [`PseudoReward`] is the paper's (definition 9), [`ProgressReward`] learns faster. A [`GuidedOption`] puts them
+//! together (definition 7): it is what policies are learnt for and run in.
 //!
 //! ```
-//! use sharp_guide::{GuideEnd, GuideRequest, GuideSettings, plan_guide};
-//! use sharp_motion::Steering;
+//! use sharp_guide::{ClearanceSearch, GuideEnd, GuidePlanner, GuideRequest, GuideRobot, Steering};
 //! use sharp_space::{Footprint, FootprintChecker, OccupancyGrid, Point, Seed};
 //!
 //! let grid = OccupancyGrid::from_ascii(0.5, &["..........................."; 8].join("\n")).unwrap();
 //! let checker = FootprintChecker::new(&grid, Footprint::rectangle(0.5, 0.335).unwrap());
+//! let robot = GuideRobot::new(&checker, Steering::RotateTranslate);
 //! let request = GuideRequest {
 //!     start: GuideEnd { position: Point::new(2.0, 2.0), heading: None },
 //!     goal: GuideEnd { position: Point::new(10.0, 2.0), heading: None },
 //!     allowed: &|_| true,
 //! };
-//! let (settings, mut rng) = (GuideSettings::default(), Seed(1).stream("guide", 0));
-//! let guide = plan_guide(&request, &checker, &Steering::RotateTranslate, &settings, &mut rng).unwrap();
+//! let mut rng = Seed(1).stream("guide", 0);
+//! let guide = ClearanceSearch::default().plan(&request, &robot, &mut rng).unwrap();
 //! assert!((guide.length_m() - 8.0).abs() < 0.01, "nothing is in the way: {} m", guide.length_m());
 //! ```
 
+pub mod conformance;
+
 mod band;
-mod floor;
-mod option_guide;
+mod context;
+mod crossing;
+mod guided_option;
+mod inflate;
+mod join;
 mod path;
 mod plan;
+mod planner;
+mod request;
 mod reward;
 mod ridge;
 mod sampled;
 mod settings;
-mod workbench;
+mod traversable;
 
-pub use option_guide::{Abstraction, OptionGuide, Robot};
+pub use crossing::crossing_heading;
+pub use guided_option::{Goal, GuidedOption, LegId, OptionSpace, Role, Target};
+pub use inflate::{GuideRobot, InflatedRobot, inflated_robots};
+pub use join::join_guides;
 pub use path::{GuidePath, GuidePathError, Projection};
-pub use plan::{GuideEnd, GuideRequest, NoGuide, plan_guide, smooth_guide};
-pub use reward::{Place, PseudoReward, ShapedReward, StepEvents};
-pub use settings::{GuidePlanner, GuideSettings};
+pub use planner::{ClearanceSearch, GuidePlanner, LearnAndLink};
+pub use request::{GuideEnd, GuideRequest, NoGuide, UnguidedOption};
+pub use reward::{Place, ProgressReward, PseudoReward, Reward, StepEvents, Transition};
+pub use settings::{GuideSettings, PlannerKind};
 pub use sharp_motion::Steering;

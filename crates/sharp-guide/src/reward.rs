@@ -1,11 +1,41 @@
-//! Pseudo-rewards: the paper's three cases (Definition 9) and the shaped reward that learns faster.
+//! Rewards: the paper's pseudo-reward (definition 9), and progress along the guide, which learns faster.
+
+use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 use sharp_space::Pose;
 
+use crate::guided_option::GuidedOption;
 use crate::path::GuidePath;
 
-/// Where a pose lies as seen from an option: the three cases of Definition 9.
+/// What one action did, as a reward sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Transition<'a> {
+    /// The option that runs.
+    pub option: &'a GuidedOption,
+    /// Where the robot is now.
+    pub pose: &'a Pose,
+    /// How far its projection moved along the guide, metres.
+    pub progress_m: f64,
+    /// How much its distance from the guide grew, metres.
+    pub deviation_m: f64,
+    /// What happened besides.
+    pub events: StepEvents,
+}
+
+/// What a learner is paid for an action. Implement [`reward`](Self::reward).
+pub trait Reward: Debug + Send + Sync {
+    /// The reward of `transition`; finite.
+    fn reward(&self, transition: &Transition<'_>) -> f64;
+
+    /// Returns true if an episode of learning ends when the robot touches an obstacle. The paper lets the robot
+    /// bump and go on.
+    fn contact_ends(&self) -> bool {
+        true
+    }
+}
+
+/// Where a pose lies as seen from an option: the three cases of definition 9.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// x ∈ β.
@@ -48,6 +78,22 @@ impl PseudoReward {
     }
 }
 
+impl Reward for PseudoReward {
+    fn reward(&self, transition: &Transition<'_>) -> f64 {
+        let StepEvents { success, stray, .. } = transition.events;
+        let place = match (success, stray) {
+            (true, _) => Place::Termination,
+            (false, true) => Place::Astray,
+            (false, false) => Place::Allowed,
+        };
+        self.value(&transition.option.guide, transition.pose, place)
+    }
+
+    fn contact_ends(&self) -> bool {
+        false
+    }
+}
+
 /// What happened in one step, besides motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepEvents {
@@ -65,7 +111,7 @@ pub struct StepEvents {
 /// punished; a difference instead of a level, so that no episode gains by ending early.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct ShapedReward {
+pub struct ProgressReward {
     /// Per metre of progress.
     pub progress_per_m: f64,
     /// Per metre that the robot moved away from the path sideways.
@@ -80,7 +126,7 @@ pub struct ShapedReward {
     pub stray: f64,
 }
 
-impl Default for ShapedReward {
+impl Default for ProgressReward {
     /// Values found in trials: a higher cost of contact makes robots timid, a lower one careless.
     fn default() -> Self {
         Self {
@@ -94,7 +140,7 @@ impl Default for ShapedReward {
     }
 }
 
-impl ShapedReward {
+impl ProgressReward {
     /// The reward of a step that moved the foot on the guide by `progress_m` and changed the size of
     /// the cross-track distance by `deviation_m`.
     #[must_use]
@@ -106,6 +152,12 @@ impl ShapedReward {
             + event(events.success, self.success)
             + event(events.contact, self.contact)
             + event(events.stray, self.stray)
+    }
+}
+
+impl Reward for ProgressReward {
+    fn reward(&self, transition: &Transition<'_>) -> f64 {
+        self.value(transition.progress_m, transition.deviation_m, transition.events)
     }
 }
 
@@ -129,7 +181,7 @@ mod tests {
 
     #[test]
     fn shaped_reward_adds_its_parts() {
-        let reward = ShapedReward::default();
+        let reward = ProgressReward::default();
         assert!(
             (reward.value(0.5, 0.1, StepEvents::default()) - (0.5 - 0.02 - 0.02)).abs() < 1e-12,
             "a step"

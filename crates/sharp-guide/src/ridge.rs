@@ -1,11 +1,11 @@
-//! A* over open cells that prefers clearance: the guide's first draft.
+//! A* over open cells that prefers clearance: the guide's first attempt.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use sharp_space::{Cell, GridFrame};
 
-use crate::floor::Floor;
+use crate::traversable::TraversableMask;
 
 /// What is known of a cell during the search.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -23,8 +23,8 @@ const STEPS: [(isize, isize); 8] = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-
 ///
 /// A metre costs 1 + `weight` · s², where s runs from 0 with comfortable room to 1 with the least.
 /// Ties go to the lower cell.
-pub(crate) fn ridge(floor: &Floor<'_>, start: Cell, goal: Cell, weight: f64) -> Option<Vec<Cell>> {
-    let mut search = Search::new(floor, goal, weight);
+pub(crate) fn ridge(mask: &TraversableMask<'_>, start: Cell, goal: Cell, weight: f64) -> Option<Vec<Cell>> {
+    let mut search = Search::new(mask, goal, weight);
     search.push(start, 1.0, 0);
     while let Some(cell) = search.pop() {
         if cell == goal {
@@ -36,7 +36,7 @@ pub(crate) fn ridge(floor: &Floor<'_>, start: Cell, goal: Cell, weight: f64) -> 
 }
 
 struct Search<'a> {
-    floor: &'a Floor<'a>,
+    mask: &'a TraversableMask<'a>,
     frame: &'a GridFrame,
     goal: Cell,
     weight: f64,
@@ -50,10 +50,10 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(floor: &'a Floor<'a>, goal: Cell, weight: f64) -> Self {
-        let frame = floor.frame();
+    fn new(mask: &'a TraversableMask<'a>, goal: Cell, weight: f64) -> Self {
+        let frame = mask.frame();
         Self {
-            floor,
+            mask,
             frame,
             goal,
             weight,
@@ -68,7 +68,7 @@ impl<'a> Search<'a> {
         let index = self.frame.index(cell);
         match self.marks[index] {
             0 => {
-                let open = self.floor.is_open(cell);
+                let open = self.mask.is_open(cell);
                 self.marks[index] = if open { 1 } else { 2 };
                 if open { Mark::Unseen } else { Mark::Blocked }
             }
@@ -122,8 +122,8 @@ impl<'a> Search<'a> {
     }
 
     fn price(&self, cell: Cell) -> f32 {
-        let (least, comfort) = (self.floor.least_m, self.floor.comfort_m);
-        let lack = ((comfort - self.floor.room_m(cell)) / (comfort - least)).clamp(0.0, 1.0);
+        let (least, comfort) = (self.mask.least_m, self.mask.comfort_m);
+        let lack = ((comfort - self.mask.clearance_m(cell)) / (comfort - least)).clamp(0.0, 1.0);
         (1.0 + self.weight * lack * lack) as f32
     }
 
@@ -162,8 +162,8 @@ mod tests {
     fn check(drawing: &str, start: (usize, usize), goal: (usize, usize), expected: &str) {
         let grid = OccupancyGrid::from_ascii(1.0, drawing).unwrap();
         let field = DistanceField::new(&grid);
-        let floor = Floor { field: &field, allowed: &|_| true, least_m: 0.3, comfort_m: 2.5 };
-        let way = ridge(&floor, Cell::new(start.0, start.1), Cell::new(goal.0, goal.1), 8.0).unwrap();
+        let mask = TraversableMask { field: &field, allowed: &|_| true, least_m: 0.3, comfort_m: 2.5 };
+        let way = ridge(&mask, Cell::new(start.0, start.1), Cell::new(goal.0, goal.1), 8.0).unwrap();
         let mut rows: Vec<Vec<char>> = grid.to_string().lines().map(|row| row.chars().collect()).collect();
         let height = rows.len();
         way.iter().for_each(|cell| rows[height - 1 - cell.row][cell.col] = 'o');
@@ -199,8 +199,8 @@ mod tests {
     fn walls_and_forbidden_cells_have_no_way_through() {
         let grid = OccupancyGrid::from_ascii(1.0, "#####\n#.#.#\n#...#\n#####").unwrap();
         let field = DistanceField::new(&grid);
-        let floor =
-            Floor { field: &field, allowed: &|cell| cell != Cell::new(2, 1), least_m: 0.3, comfort_m: 1.0 };
-        assert_eq!(ridge(&floor, Cell::new(1, 1), Cell::new(3, 1), 1.0), None);
+        let mask =
+            TraversableMask { field: &field, allowed: &|cell| cell != Cell::new(2, 1), least_m: 0.3, comfort_m: 1.0 };
+        assert_eq!(ridge(&mask, Cell::new(1, 1), Cell::new(3, 1), 1.0), None);
     }
 }

@@ -1,24 +1,28 @@
-//! How guides are planned.
+//! Settings of the guide planners.
 
+use serde::{Deserialize, Serialize};
 use sharp_motion::{Budget, RrtSettings};
 
-/// Which planner draws the guide path.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum GuidePlanner {
-    /// Search over cells that prefers clearance, then smoothing; Learn and Link where that fails.
+/// Which planner plans the guide path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PlannerKind {
+    /// [`ClearanceSearch`](crate::ClearanceSearch).
     #[default]
-    Ridge,
-    /// Learn and Link at once, as in the paper.
+    ClearanceSearch,
+    /// [`LearnAndLink`](crate::LearnAndLink), as in the paper.
     LearnAndLink,
 }
 
-/// The settings of [`plan_guide`](crate::plan_guide).
+/// How guides are planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuideSettings {
     /// The threshold t of Definition 8, metres.
     pub spacing_m: f64,
     /// Which planner.
-    pub planner: GuidePlanner,
+    pub planner: PlannerKind,
+    /// Plan for a robot with a safety margin first; false asks for no more than the robot needs.
+    pub margins: bool,
     /// How much more a metre with no room to spare costs than a metre with comfortable room.
     pub clearance_weight: f64,
     /// Room beyond the circumscribed radius that is comfortable, metres.
@@ -51,7 +55,8 @@ impl Default for GuideSettings {
     fn default() -> Self {
         Self {
             spacing_m: 0.25,
-            planner: GuidePlanner::Ridge,
+            planner: PlannerKind::ClearanceSearch,
+            margins: true,
             clearance_weight: 8.0,
             comfort_m: 0.25,
             // Half a cell: what the grid's distances may be wrong by.

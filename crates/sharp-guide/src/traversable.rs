@@ -1,30 +1,30 @@
-//! The part of the map that one guide may use, in units of cells.
+//! The traversable mask: the part of the map that one guide may use, in units of cells.
 
 use sharp_space::{Cell, DistanceField, GridFrame, Point, Vector};
 
-/// Cells that are allowed and roomy enough for the robot's centre.
+/// Cells that are allowed and have enough clearance for the robot's centre.
 #[derive(Clone, Copy)]
-pub(crate) struct Floor<'a> {
+pub(crate) struct TraversableMask<'a> {
     pub(crate) field: &'a DistanceField,
     pub(crate) allowed: &'a dyn Fn(Cell) -> bool,
-    /// The least room that a cell must have, metres.
+    /// The least clearance that a cell must have, metres.
     pub(crate) least_m: f64,
-    /// The room beyond which more is no better, metres.
+    /// The clearance beyond which more makes no difference, metres.
     pub(crate) comfort_m: f64,
 }
 
-impl Floor<'_> {
+impl TraversableMask<'_> {
     pub(crate) const fn frame(&self) -> &GridFrame {
         self.field.frame()
     }
 
     /// Metres from the centre of `cell` to the side of the nearest blocked cell (in a straight wall).
-    pub(crate) fn room_m(&self, cell: Cell) -> f64 {
+    pub(crate) fn clearance_m(&self, cell: Cell) -> f64 {
         self.field.at(cell) - 0.5 * self.frame().resolution_m
     }
 
     pub(crate) fn is_open(&self, cell: Cell) -> bool {
-        self.room_m(cell) >= self.least_m && (self.allowed)(cell)
+        self.clearance_m(cell) >= self.least_m && (self.allowed)(cell)
     }
 
     /// The open cell nearest to `point` within `reach_m`; ties go to the lower cell.
@@ -55,8 +55,8 @@ impl Floor<'_> {
         inside && self.is_open(Cell::new(at.x as usize, at.y as usize))
     }
 
-    /// Room at the grid position `at`, metres, and its gradient, metres per metre: bilinear.
-    pub(crate) fn room_and_gradient(&self, at: Vector) -> (f64, Vector) {
+    /// Clearance at the grid position `at`, metres, and its gradient, metres per metre: bilinear.
+    pub(crate) fn clearance_and_gradient(&self, at: Vector) -> (f64, Vector) {
         let frame = self.frame();
         let along = |x: f64, len: usize| {
             let x = (x - 0.5).clamp(0.0, len as f64 - 1.0);
@@ -65,8 +65,8 @@ impl Floor<'_> {
         };
         let (left, right, tx) = along(at.x, frame.width);
         let (below, above, ty) = along(at.y, frame.height);
-        let room = |col, row| self.room_m(Cell::new(col, row));
-        let (a, b, c, d) = (room(left, below), room(right, below), room(left, above), room(right, above));
+        let at_cell = |col, row| self.clearance_m(Cell::new(col, row));
+        let (a, b, c, d) = (at_cell(left, below), at_cell(right, below), at_cell(left, above), at_cell(right, above));
         let value = (a * (1.0 - tx) + b * tx) * (1.0 - ty) + (c * (1.0 - tx) + d * tx) * ty;
         let dx = (b - a) * (1.0 - ty) + (d - c) * ty;
         let dy = (c - a) * (1.0 - tx) + (d - b) * tx;

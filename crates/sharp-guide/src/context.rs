@@ -1,14 +1,15 @@
-//! Everything one guide is made with: request, robot, settings and the steps of its making.
+//! The planning context of one guide: request, robot, settings, and the steps of its planning.
 
 use sharp_motion::{Maneuver, Steering};
-use sharp_space::{CollisionChecker, FootprintChecker, Heading, Point, Pose, Vector};
+use sharp_space::{CollisionChecker, Heading, Point, Pose, Vector};
 
 use crate::band::{self, BandSettings, COARSE_M};
-use crate::floor::Floor;
 use crate::path::GuidePath;
-use crate::plan::{GuideEnd, GuideRequest, NoGuide};
+use crate::inflate::GuideRobot;
+use crate::request::{GuideEnd, GuideRequest, NoGuide};
 use crate::ridge::ridge;
 use crate::settings::GuideSettings;
+use crate::traversable::TraversableMask;
 
 /// The distance between two looks at the outline, metres: under a cell of any indoor map.
 pub(crate) const CHECK_STEP_M: f64 = 0.05;
@@ -18,51 +19,51 @@ const CURVATURE_SLACK: f64 = 1.1;
 const LEAD_IN_RADIUS_M: f64 = 0.4;
 /// How far along the path the lead-in may join it, metres.
 const LEAD_IN_MAX_M: f64 = 5.0;
-/// An end's direction is kept if the draft is not further off than this, radians.
+/// An end's direction is kept if the unsmoothed path is not further off than this, radians.
 const END_TURN_MAX_RAD: f64 = 1.3;
 
-/// The knobs that differ between attempts.
+/// What differs between the attempts to plan a guide.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Draft {
+pub(crate) struct Attempt {
     pub(crate) weight: f64,
     pub(crate) pull_per_m2: f64,
-    /// Room beyond the inscribed radius.
+    /// Clearance beyond the inscribed radius, metres.
     pub(crate) margin_m: f64,
     /// Whether to arrive along the goal's heading.
     pub(crate) aim_goal: bool,
 }
 
-pub(crate) struct Workbench<'a> {
+/// Everything that one guide is planned with.
+#[derive(Debug)]
+pub(crate) struct GuideContext<'a> {
     pub(crate) request: &'a GuideRequest<'a>,
-    pub(crate) checker: &'a FootprintChecker,
-    pub(crate) steering: &'a Steering,
+    pub(crate) robot: &'a GuideRobot<'a>,
     pub(crate) settings: &'a GuideSettings,
 }
 
 /// The robot may stand where the outline is free and the cell is allowed.
-impl CollisionChecker for Workbench<'_> {
+impl CollisionChecker for GuideContext<'_> {
     fn is_free(&self, pose: Pose) -> bool {
-        self.is_allowed(pose.position) && self.checker.is_free(pose)
+        self.is_allowed(pose.position) && self.robot.geometry.is_free(pose)
     }
 }
 
-impl<'a> Workbench<'a> {
+impl<'a> GuideContext<'a> {
     pub(crate) const fn new(
         request: &'a GuideRequest<'a>,
-        checker: &'a FootprintChecker,
-        steering: &'a Steering,
+        robot: &'a GuideRobot<'a>,
         settings: &'a GuideSettings,
     ) -> Self {
-        Self { request, checker, steering, settings }
+        Self { request, robot, settings }
     }
 
-    /// The floor whose cells have `margin_m` more room than the inscribed radius.
-    pub(crate) fn floor(&self, margin_m: f64) -> Floor<'a> {
-        let footprint = self.checker.footprint();
+    /// The cells that have `margin_m` more clearance than the inscribed radius.
+    pub(crate) fn mask(&self, margin_m: f64) -> TraversableMask<'a> {
+        let footprint = self.robot.geometry.footprint();
         let least_m = footprint.inscribed_radius_m() + margin_m;
-        // The price divides by the difference.
+        // The price of a cell divides by the difference.
         let comfort_m = (footprint.circumscribed_radius_m() + self.settings.comfort_m).max(least_m + 0.01);
-        Floor { field: self.checker.field(), allowed: self.request.allowed, least_m, comfort_m }
+        TraversableMask { field: self.robot.geometry.clearance(), allowed: self.request.allowed, least_m, comfort_m }
     }
 
     /// Refuses a request whose ends are the same place.
@@ -74,51 +75,51 @@ impl<'a> Workbench<'a> {
     /// A way through all cells in which the robot could possibly stand, as points in the grid.
     pub(crate) fn least_way(&self) -> Result<Vec<Vector>, NoGuide> {
         // Centre to centre distances and the half cell taken off them hide up to 1.21 cells.
-        let margin_m = -1.21 * self.checker.field().frame().resolution_m;
-        self.draft(&self.floor(margin_m), self.settings.clearance_weight)
+        let margin_m = -1.21 * self.robot.geometry.clearance().frame().resolution_m;
+        self.first_path(&self.mask(margin_m), self.settings.clearance_weight)
     }
 
     /// A guide along the ridge of clearance.
-    pub(crate) fn ridge_guide(&self, draft: &Draft) -> Result<GuidePath, NoGuide> {
-        let floor = self.floor(draft.margin_m);
-        let points = self.draft(&floor, draft.weight)?;
-        self.smooth_guide(&floor, (&points, &[]), draft)
+    pub(crate) fn ridge_guide(&self, attempt: &Attempt) -> Result<GuidePath, NoGuide> {
+        let mask = self.mask(attempt.margin_m);
+        let points = self.first_path(&mask, attempt.weight)?;
+        self.smooth_guide(&mask, (&points, &[]), attempt)
     }
 
     /// Smooths `points` into a path that meets all `discs` (centre and radius, metres), leads the robot onto
-    /// it and certifies the result.
+    /// it and checks the result.
     pub(crate) fn smooth_guide(
         &self,
-        floor: &Floor<'_>,
+        mask: &TraversableMask<'_>,
         (points, discs): (&[Vector], &[(Point, f64)]),
-        draft: &Draft,
+        attempt: &Attempt,
     ) -> Result<GuidePath, NoGuide> {
         let (start, mut goal) = (self.request.start, self.request.goal);
-        goal.heading = goal.heading.filter(|_| draft.aim_goal);
+        goal.heading = goal.heading.filter(|_| attempt.aim_goal);
         let back: Vec<Vector> = points.iter().rev().copied().collect();
-        let ends = [self.end(floor, &start, points, 1.0), self.end(floor, &goal, &back, -1.0)];
-        let frame = floor.frame();
+        let ends = [self.end(mask, &start, points, 1.0), self.end(mask, &goal, &back, -1.0)];
+        let frame = mask.frame();
         let disc =
             |&(center, radius_m): &(Point, f64)| (frame.to_grid(center), radius_m / frame.resolution_m);
         let discs: Vec<(Vector, f64)> = discs.iter().map(disc).collect();
-        let (pull_per_m2, stiffness_m) = (draft.pull_per_m2, self.settings.stiffness_m);
+        let (pull_per_m2, stiffness_m) = (attempt.pull_per_m2, self.settings.stiffness_m);
         let band = BandSettings { pull_per_m2, stiffness_m, ends, discs: &discs };
         let smooth: Vec<Point> =
-            band::smooth(floor, points, &band).into_iter().map(|point| frame.from_grid(point)).collect();
+            band::smooth(mask, points, &band).into_iter().map(|point| frame.from_grid(point)).collect();
         let guide = self.lead_in(self.through(smooth)?)?;
-        self.certify(&guide)?;
+        self.check(&guide)?;
         Ok(guide)
     }
 
-    /// The draft of the path on `floor`, from one exact end to the other.
-    fn draft(&self, floor: &Floor<'_>, weight: f64) -> Result<Vec<Vector>, NoGuide> {
-        let frame = floor.frame();
+    /// The unsmoothed path through `mask`, from one exact end to the other.
+    fn first_path(&self, mask: &TraversableMask<'_>, weight: f64) -> Result<Vec<Vector>, NoGuide> {
+        let frame = mask.frame();
         let (start, goal) = (self.request.start.position, self.request.goal.position);
         // Beyond its own half width an end and its cell could lie on two sides of a thin wall.
-        let reach_m = self.checker.footprint().inscribed_radius_m() + 2.0 * frame.resolution_m;
-        let first = floor.nearest_open(start, reach_m).ok_or(NoGuide::Start(start))?;
-        let last = floor.nearest_open(goal, reach_m).ok_or(NoGuide::Goal(goal))?;
-        let cells = ridge(floor, first, last, weight).ok_or(NoGuide::Unreachable)?;
+        let reach_m = self.robot.geometry.footprint().inscribed_radius_m() + 2.0 * frame.resolution_m;
+        let first = mask.nearest_open(start, reach_m).ok_or(NoGuide::Start(start))?;
+        let last = mask.nearest_open(goal, reach_m).ok_or(NoGuide::Goal(goal))?;
+        let cells = ridge(mask, first, last, weight).ok_or(NoGuide::Unreachable)?;
         let mut points: Vec<Vector> =
             cells.iter().map(|cell| Vector::new(cell.col as f64 + 0.5, cell.row as f64 + 0.5)).collect();
         let count = points.len();
@@ -132,8 +133,8 @@ impl<'a> Workbench<'a> {
 
     /// The direction in the grid in which the path shall leave or reach an end, if one is wanted
     /// or only one fits. `points` run from the end inwards, `sign` is −1 at the goal.
-    fn end(&self, floor: &Floor<'_>, end: &GuideEnd, points: &[Vector], sign: f64) -> Option<Vector> {
-        let frame = floor.frame();
+    fn end(&self, mask: &TraversableMask<'_>, end: &GuideEnd, points: &[Vector], sign: f64) -> Option<Vector> {
+        let frame = mask.frame();
         let coarse = COARSE_M / frame.resolution_m;
         let inward = points.iter().find(|&point| (point - points[0]).norm() >= 1.5 * coarse);
         let inward = inward.unwrap_or(&points[points.len() - 1]) - points[0];
@@ -144,12 +145,12 @@ impl<'a> Workbench<'a> {
         }
         let ahead = Pose::at(end.position, wanted).to_world(Vector::new(1.0, 0.0));
         let direction = (frame.to_grid(ahead) - points[0]) * frame.resolution_m;
-        floor.is_open_at(points[0] + direction * (sign * coarse)).then_some(direction)
+        mask.is_open_at(points[0] + direction * (sign * coarse)).then_some(direction)
     }
 
     /// The heading nearest to `preferred` at which the outline is free, unless `preferred` itself is.
     fn fitting(&self, position: Point, preferred: Heading) -> Option<Heading> {
-        let is_free = |heading: &Heading| self.checker.is_free(Pose::at(position, *heading));
+        let is_free = |heading: &Heading| self.robot.geometry.is_free(Pose::at(position, *heading));
         if is_free(&preferred) {
             return None;
         }
@@ -188,7 +189,7 @@ impl<'a> Workbench<'a> {
         if off <= self.settings.start_turn_rad || self.can_turn(start, guide.start().heading) {
             return Ok(guide);
         }
-        let radius_m = (1.1 * self.steering.radius_m()).max(LEAD_IN_RADIUS_M);
+        let radius_m = (1.1 * self.robot.steering.radius_m()).max(LEAD_IN_RADIUS_M);
         let curve = Steering::Dubins { radius_m };
         let length_m = guide.length_m();
         let joins = (2..=(4.0 * LEAD_IN_MAX_M) as usize).map(|i| i as f64 * 0.25);
@@ -214,21 +215,21 @@ impl<'a> Workbench<'a> {
     /// Returns true if the robot can turn in place from `start` to `heading`.
     fn can_turn(&self, start: Pose, heading: Heading) -> bool {
         let turned = Pose::at(start.position, heading);
-        *self.steering == Steering::RotateTranslate
-            && self.checker.is_segment_free(start, turned, CHECK_STEP_M)
+        self.robot.steering == Steering::RotateTranslate
+            && self.robot.geometry.is_segment_free(start, turned, CHECK_STEP_M)
     }
 
     /// Checks outline, bends and cells along `guide`.
-    pub(crate) fn certify(&self, guide: &GuidePath) -> Result<(), NoGuide> {
+    pub(crate) fn check(&self, guide: &GuidePath) -> Result<(), NoGuide> {
         let steps = (guide.length_m() / CHECK_STEP_M).ceil();
         for i in 0..=steps as usize {
             let pose = guide.pose_at(guide.length_m() * i as f64 / steps);
-            if !self.checker.is_free(pose) {
+            if !self.robot.geometry.is_free(pose) {
                 return Err(NoGuide::Footprint(pose.position));
             }
         }
         let poses = guide.poses();
-        let radius_m = self.steering.radius_m();
+        let radius_m = self.robot.steering.radius_m();
         for pair in poses.windows(2) {
             let turn = pair[0].heading.turn_to(pair[1].heading).abs();
             if turn * radius_m > CURVATURE_SLACK * pair[0].distance_m(&pair[1]) {
@@ -243,6 +244,6 @@ impl<'a> Workbench<'a> {
     }
 
     fn is_allowed(&self, point: Point) -> bool {
-        self.checker.field().frame().cell_at(point).is_some_and(|cell| (self.request.allowed)(cell))
+        self.robot.geometry.clearance().frame().cell_at(point).is_some_and(|cell| (self.request.allowed)(cell))
     }
 }
