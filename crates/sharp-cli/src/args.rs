@@ -168,7 +168,7 @@ pub(crate) struct Solve {
     #[arg(long, value_enum, default_value_t = Switch::On)]
     pub(crate) cost_update: Switch,
     /// What a failure counts for beside the seconds of a success: more makes plans safer and slower.
-    #[arg(long, value_name = "S", default_value_t = sharp_plan::FAILURE_COST_S)]
+    #[arg(long, value_name = "S", default_value_t = sharp_drive::FAILURE_COST_S)]
     pub(crate) failure_cost: f64,
     /// How guides are planned: along the ridge of clearance, or by the paper's learn-and-link trees.
     #[arg(long, value_enum, default_value_t = Guide::Ridge)]

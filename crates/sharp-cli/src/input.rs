@@ -4,10 +4,11 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
+use sharp_drive::World;
 use sharp_maps::{LoadOptions, MapFile, load};
-use sharp_plan::{Query, Workspace};
+use sharp_plan::Query;
 use sharp_sim::{NoiseError, NoiseModel, RobotModel, SimulatorKind, UnknownSimulator};
-use sharp_space::{CollisionChecker, Pose};
+use sharp_space::Pose;
 
 use crate::args::{MapArgs, Unknown};
 use crate::outcome::Failure;
@@ -111,20 +112,20 @@ pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
 }
 
 /// Verifies that both ends of `query` can be stood on.
-pub(crate) fn check_query(workspace: &Workspace, query: &Query) -> Result<(), Failure> {
-    check_end(workspace, &query.start, "start", ["START_OUTSIDE_MAP", "START_OCCUPIED"], true)?;
-    check_end(workspace, &query.goal, "goal", ["GOAL_OUTSIDE_MAP", "GOAL_OCCUPIED"], false)
+pub(crate) fn check_query(world: &World, query: &Query) -> Result<(), Failure> {
+    check_end(world, &query.start, "start", ["START_OUTSIDE_MAP", "START_OCCUPIED"], true)?;
+    check_end(world, &query.goal, "goal", ["GOAL_OUTSIDE_MAP", "GOAL_OCCUPIED"], false)
 }
 
 /// The goal's heading is free: there it is enough that the robot fits in some direction.
 fn check_end(
-    workspace: &Workspace,
+    world: &World,
     pose: &Pose,
     name: &str,
     [outside, occupied]: [&'static str; 2],
     heading_counts: bool,
 ) -> Result<(), Failure> {
-    let frame = workspace.grid.frame();
+    let frame = world.grid.frame();
     let at =
         format!("{name} ({:.2}, {:.2}, {:.2})", pose.position.x, pose.position.y, pose.heading.radians());
     let Some(cell) = frame.cell_at(pose.position) else {
@@ -139,30 +140,30 @@ fn check_end(
     };
     let turned = |step: u32| Pose::at(pose.position, (pose.heading.radians() + f64::from(step) * 0.1).into());
     let fits = if heading_counts {
-        workspace.checker.is_free(*pose)
+        world.geometry.is_free(*pose)
     } else {
-        (0..63).any(|step| workspace.checker.is_free(turned(step)))
+        (0..63).any(|step| world.geometry.is_free(turned(step)))
     };
     if fits {
         return Ok(());
     }
-    let what = match workspace.grid.get(cell) {
+    let what = match world.grid.get(cell) {
         sharp_space::Occupancy::Occupied => "lies in an obstacle".to_owned(),
         sharp_space::Occupancy::Unknown => {
             "lies in unknown space (--unknown free takes it as free)".to_owned()
         }
         sharp_space::Occupancy::Free => {
-            format!("is too near to an obstacle for the {}: its footprint overlaps", workspace.robot.name)
+            format!("is too near to an obstacle for the {}: its footprint overlaps", world.robot.name)
         }
     };
-    Err(Failure::new(occupied, format!("{at} {what}; {}", nearest_hint(workspace, pose))))
+    Err(Failure::new(occupied, format!("{at} {what}; {}", nearest_hint(world, pose))))
 }
 
 /// Where the robot would fit.
-fn nearest_hint(workspace: &Workspace, pose: &Pose) -> String {
-    let frame = workspace.grid.frame();
-    let room_m = workspace.robot.footprint.circumscribed_radius_m() + 1.5 * frame.resolution_m;
-    let field = workspace.checker.field();
+fn nearest_hint(world: &World, pose: &Pose) -> String {
+    let frame = world.grid.frame();
+    let room_m = world.robot.footprint.circumscribed_radius_m() + 1.5 * frame.resolution_m;
+    let field = world.geometry.clearance();
     let fits = (0..frame.len()).map(|index| frame.cell(index)).filter(|&cell| field.at(cell) > room_m);
     let distance = |cell| (frame.center(cell) - pose.position).norm();
     match fits.min_by(|&a, &b| distance(a).total_cmp(&distance(b))) {

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use sharp_plan::{Abstraction, Episode, EpisodeEnd, Plan, Query, write_atomic};
-use sharp_rbvd::Rbvd;
+use sharp_drive::EpisodeEnd;
+use sharp_plan::{Abstraction, Execution, Plan, Query, write_atomic};
+use sharp_rbvd::StateAbstraction;
 use sharp_regions::Heatmap;
 use sharp_space::{OccupancyGrid, Point, Region};
 
@@ -26,13 +27,13 @@ pub(crate) fn regions(grid: &OccupancyGrid, heatmap: &Heatmap, regions: &[Region
 }
 
 /// The regions of all states.
-pub(crate) fn regions_of(rbvd: &Rbvd) -> Vec<Region> {
-    rbvd.states().map(|state| rbvd.region(state).clone()).collect()
+pub(crate) fn regions_of(states: &dyn StateAbstraction) -> Vec<Region> {
+    states.regions().to_vec()
 }
 
 /// Cells coloured by state, with endpoints and options.
 pub(crate) fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> String {
-    let (rbvd, options) = (&abstraction.rbvd, &abstraction.options);
+    let (rbvd, options) = (&*abstraction.states, &abstraction.options);
     let regions = regions_of(rbvd);
     let frame = grid.frame();
     let labels: Vec<(u32, Point)> =
@@ -54,23 +55,23 @@ pub(crate) fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> St
 }
 
 /// The plan's guides over the faded abstraction, with what was driven.
-pub(crate) fn plan(plan: &Plan, query: &Query, episodes: &[Episode]) -> String {
-    let (rbvd, legs) = (&plan.abstraction.rbvd, &plan.solution.legs);
-    let guides: Vec<Vec<Point>> = legs
+pub(crate) fn plan(plan: &Plan, query: &Query, executions: &[Execution]) -> String {
+    let (rbvd, steps) = (&*plan.abstraction.states, &plan.solution.steps);
+    let guides: Vec<Vec<Point>> = steps
         .iter()
-        .map(|planned| planned.leg.guide.poses().iter().map(|pose| pose.position).collect())
+        .map(|planned| planned.option.guide.poses().iter().map(|pose| pose.position).collect())
         .collect();
-    let targets: Vec<Point> = legs.iter().map(|planned| planned.leg.target.center()).collect();
-    let drives: Vec<Drive> = episodes
+    let targets: Vec<Point> = steps.iter().map(|planned| planned.option.target.center()).collect();
+    let drives: Vec<Drive> = executions
         .iter()
-        .map(|episode| Drive { poses: episode.trace.clone(), failed: episode.end != EpisodeEnd::Reached })
+        .map(|run| Drive { poses: run.record.trace.clone(), failed: run.end != EpisodeEnd::Reached })
         .collect();
-    Scene::new(&plan.workspace.grid)
+    Scene::new(&plan.world.grid)
         .states(&|cell| rbvd.state_of(cell).map(|state| state.0))
         .faded()
-        .endpoints(&targets, plan.workspace.robot.goal_tolerance_m)
+        .endpoints(&targets, plan.world.robot.goal_tolerance_m)
         .guides(&guides)
-        .drives(&drives, plan.workspace.robot.footprint)
+        .drives(&drives, plan.world.robot.footprint)
         .problem(query.start, query.goal)
         .to_svg()
 }

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use sharp_drive::World;
 use sharp_options::{OptionKind, OptionSettings};
-use sharp_plan::{AbstractionFile, FORMAT, OptionLibrary, Workspace, hash, map_hash};
+use sharp_plan::{AbstractionFile, FORMAT, OptionLibrary, hash, map_hash};
 use sharp_rbvd::{CellMetric, Rbvd, RbvdSettings};
 use sharp_regions::{
     Heatmap, RegionPredictor, RegionSettings, Source, geometric_regions, grid_regions, predict_regions,
@@ -39,12 +40,12 @@ impl From<Kind> for OptionKind {
 
 /// The abstraction for `args`, from `cache` if it holds it, and kept there.
 pub(crate) fn abstraction(
-    workspace: &Workspace,
+    world: &World,
     args: &AbstractionArgs,
     cache: Option<&Path>,
     stopwatch: &mut Stopwatch,
 ) -> Result<Built, Failure> {
-    let map = map_hash(&workspace.grid);
+    let map = map_hash(&world.grid);
     let path = cache.map(|folder| folder.join(cache_name(args)));
     if let Some(path) = path.as_deref().filter(|path| path.exists()) {
         stopwatch.enter("abstraction");
@@ -53,11 +54,11 @@ pub(crate) fn abstraction(
         return Ok(Built { source: file.regions.clone(), file, heatmap: None });
     }
     stopwatch.enter("regions");
-    let (heatmap, regions, source) = regions(workspace, &args.regions)?;
+    let (heatmap, regions, source) = regions(world, &args.regions)?;
     stopwatch.enter("abstraction");
-    let rbvd = diagram(workspace, &regions, args.metric)?;
-    let settings = option_settings(workspace);
-    let file = AbstractionFile::new(map, source.clone(), args.options.into(), settings, rbvd);
+    let rbvd = diagram(world, &regions, args.metric)?;
+    let settings = option_settings(world);
+    let file = AbstractionFile::new(map, source.clone(), args.options.into(), settings, &rbvd);
     if let Some(path) = path {
         file.save(&path)?;
     }
@@ -75,17 +76,17 @@ fn cache_name(args: &AbstractionArgs) -> String {
 
 /// Critical regions as `choice` asks for them, with the name of their source.
 pub(crate) fn regions(
-    workspace: &Workspace,
+    world: &World,
     choice: &str,
 ) -> Result<(Option<Heatmap>, Vec<Region>, String), Failure> {
     let settings = RegionSettings::default();
-    let (grid, footprint) = (&workspace.grid, &workspace.robot.footprint);
+    let (grid, footprint) = (&world.grid, &world.robot.footprint);
     let prediction = match choice {
-        "net" => predict_regions(grid, footprint, &shipped(&workspace.robot), &settings),
+        "net" => predict_regions(grid, footprint, &shipped(&world.robot), &settings),
         "geometric" => geometric_regions(grid, footprint, &settings.geometric),
-        "random" | "grid" => return Ok(blind_regions(workspace, choice)),
+        "random" | "grid" => return Ok(blind_regions(world, choice)),
         file => {
-            let regions = regions_from_file(workspace, file)?;
+            let regions = regions_from_file(world, file)?;
             return Ok((None, regions, file.to_owned()));
         }
     };
@@ -100,18 +101,18 @@ pub(crate) fn regions(
 pub(crate) const BLIND_RADIUS_M: f64 = 0.5;
 
 /// As many discs as the network finds regions, at random or on a lattice: what a predictor must beat.
-fn blind_regions(workspace: &Workspace, choice: &str) -> (Option<Heatmap>, Vec<Region>, String) {
-    let footprint = &workspace.robot.footprint;
-    let predictor = shipped(&workspace.robot);
-    let wanted = predict_regions(&workspace.grid, footprint, &predictor, &RegionSettings::default()).regions;
-    let (field, least_m) = (workspace.checker.field(), footprint.inscribed_radius_m());
+fn blind_regions(world: &World, choice: &str) -> (Option<Heatmap>, Vec<Region>, String) {
+    let footprint = &world.robot.footprint;
+    let predictor = shipped(&world.robot);
+    let wanted = predict_regions(&world.grid, footprint, &predictor, &RegionSettings::default()).regions;
+    let (field, least_m) = (world.geometry.clearance(), footprint.inscribed_radius_m());
     let regions = if choice == "grid" {
         grid_regions(field, least_m, wanted.len(), BLIND_RADIUS_M)
     } else {
         let mut rng = Seed(1).stream("random regions", 0);
         random_regions(field, least_m, wanted.len(), BLIND_RADIUS_M, &mut rng)
     };
-    let heatmap = Heatmap::from_regions(*workspace.grid.frame(), &regions);
+    let heatmap = Heatmap::from_regions(*world.grid.frame(), &regions);
     (Some(heatmap), regions, choice.to_owned())
 }
 
@@ -121,13 +122,13 @@ pub(crate) fn shipped(robot: &RobotModel) -> RegionPredictor {
 }
 
 /// A region of one cell's neighbourhood around each centre listed in a file.
-fn regions_from_file(workspace: &Workspace, file: &str) -> Result<Vec<Region>, Failure> {
+fn regions_from_file(world: &World, file: &str) -> Result<Vec<Region>, Failure> {
     let broken = |problem: String| Failure::new("REGIONS_INVALID", format!("{file}: {problem}"));
     let text = read_text(file, "regions", "net, geometric, random, grid or a file")?;
     let centers: Vec<(f64, f64)> = ron::from_str(&text).map_err(|error| broken(error.to_string()))?;
-    let frame = workspace.grid.frame();
-    let field = workspace.checker.field();
-    let least_m = workspace.robot.footprint.inscribed_radius_m();
+    let frame = world.grid.frame();
+    let field = world.geometry.clearance();
+    let least_m = world.robot.footprint.inscribed_radius_m();
     let mut regions = Vec::with_capacity(centers.len());
     for (index, &(x, y)) in centers.iter().enumerate() {
         let cell = frame.cell_at(sharp_space::Point::new(x, y)).filter(|&cell| field.at(cell) >= least_m);
@@ -142,35 +143,35 @@ fn regions_from_file(workspace: &Workspace, file: &str) -> Result<Vec<Region>, F
     Ok(regions)
 }
 
-/// How options are made for the robot of `workspace`.
-pub(crate) fn option_settings(workspace: &Workspace) -> OptionSettings {
+/// How options are made for the robot of `world`.
+pub(crate) fn option_settings(world: &World) -> OptionSettings {
     // A car has to round the corners of its plans within them.
-    let factor = if workspace.robot.can_turn_in_place() { 1.0 } else { 2.0 };
-    let endpoint_radius_m = factor * workspace.robot.goal_tolerance_m;
+    let factor = if world.robot.can_turn_in_place() { 1.0 } else { 2.0 };
+    let endpoint_radius_m = factor * world.robot.goal_tolerance_m;
     OptionSettings { endpoint_radius_m, ..OptionSettings::default() }
 }
 
-/// How the diagram is built for the robot of `workspace`: half a cell is what distances may be wrong by.
-pub(crate) fn rbvd_settings(workspace: &Workspace) -> RbvdSettings {
-    let resolution_m = workspace.grid.frame().resolution_m;
-    RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m)
+/// How the diagram is built for the robot of `world`: half a cell is what distances may be wrong by.
+pub(crate) fn rbvd_settings(world: &World) -> RbvdSettings {
+    let resolution_m = world.grid.frame().resolution_m;
+    RbvdSettings::for_footprint(&world.robot.footprint, 0.5 * resolution_m, resolution_m)
 }
 
 /// The region-based Voronoi diagram of `regions`.
-pub(crate) fn diagram(workspace: &Workspace, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
-    let mut settings = rbvd_settings(workspace);
+pub(crate) fn diagram(world: &World, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
+    let mut settings = rbvd_settings(world);
     if metric == Metric::Paper {
         settings.metric = CellMetric::Euclidean;
     }
-    Rbvd::build(workspace.checker.field(), regions, &settings).map_err(|error| {
-        Failure::new("NO_FREE_SPACE", format!("map has no room for the {}: {error}", workspace.robot.name))
+    Rbvd::build(world.geometry.clearance(), regions, &settings).map_err(|error| {
+        Failure::new("NO_FREE_SPACE", format!("map has no room for the {}: {error}", world.robot.name))
     })
 }
 
 /// The library for `choice` ("none", a folder, or by default a cache folder), opened for this world.
 pub(crate) fn library(
     choice: Option<&str>,
-    workspace: &Workspace,
+    world: &World,
     noise: &NoiseModel,
     learning: Learning,
 ) -> Result<OptionLibrary, Failure> {
@@ -179,15 +180,15 @@ pub(crate) fn library(
         Some(folder) => PathBuf::from(folder),
         None => cache_folder(),
     };
-    Ok(OptionLibrary::open(&root, &library_key(workspace, noise, learning))?)
+    Ok(OptionLibrary::open(&root, &library_key(world, noise, learning))?)
 }
 
 /// Options learnt in one world say nothing about another: the key names robot, noise, mode and format,
 /// and then the map.
-fn library_key(workspace: &Workspace, noise: &NoiseModel, learning: Learning) -> String {
-    let world = format!("{:?} {noise:?} {learning:?} {FORMAT}", workspace.robot);
-    let world = &hash(world.as_bytes())[..8];
-    format!("{}-{world}-{}", workspace.robot.name, &map_hash(&workspace.grid)[..16])
+fn library_key(world: &World, noise: &NoiseModel, learning: Learning) -> String {
+    let key = format!("{:?} {noise:?} {learning:?} {FORMAT}", world.robot);
+    let key = &hash(key.as_bytes())[..8];
+    format!("{}-{key}-{}", world.robot.name, &map_hash(&world.grid)[..16])
 }
 
 fn cache_folder() -> PathBuf {

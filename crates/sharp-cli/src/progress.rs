@@ -7,7 +7,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use sharp_plan::{Learnt, Leg, Monitor, Phase};
+use sharp_guide::GuidedOption;
+use sharp_plan::{LearntPolicy, Monitor, Phase};
 use sharp_rl::Progress;
 
 use crate::curves::CurveFolder;
@@ -122,12 +123,14 @@ impl SolveMonitor {
 impl Monitor for SolveMonitor {
     fn phase(&self, phase: Phase) {
         let (name, message) = match phase {
+            Phase::Regions => ("regions", "predicting critical regions".to_owned()),
+            Phase::Abstraction => ("abstraction", "building the abstraction".to_owned()),
             Phase::Search => ("search", "searching".to_owned()),
             Phase::Guide => ("guide", "planning guides".to_owned()),
             Phase::Learn(0) => ("learn", "every policy is at hand".to_owned()),
             Phase::Learn(legs) => ("learn", format!("learning {legs} policies")),
             Phase::Verify => ("verify", "running the whole plan, repairing weak legs".to_owned()),
-            Phase::Done => {
+            _ => {
                 self.watch().stop();
                 return;
             }
@@ -136,19 +139,19 @@ impl Monitor for SolveMonitor {
         self.spinner.set_message(message);
     }
 
-    fn trained(&self, leg: &Leg, progress: &Progress<'_>) {
+    fn trained(&self, option: &GuidedOption, progress: &Progress<'_>) {
         if let Some(curves) = &self.curves {
-            let name = leg.id.to_string().replace(':', "_");
+            let name = option.id.to_string().replace(':', "_");
             curves.lock().unwrap_or_else(PoisonError::into_inner).note(&name, progress);
         }
     }
 
-    fn learnt(&self, leg: &Leg, learnt: &Learnt) {
+    fn learnt(&self, option: &GuidedOption, learnt: &LearntPolicy) {
         let count = self.learnt.fetch_add(1, Ordering::Relaxed) + 1;
-        let tally = learnt.verified;
+        let tally = learnt.estimate.count;
         self.spinner.set_message(format!(
             "{count} policies; {} holds {} of {}, {:.1} s",
-            leg.id, tally.successes, tally.episodes, learnt.mean_time_s
+            option.id, tally.successes, tally.episodes, learnt.estimate.mean_time_s
         ));
     }
 

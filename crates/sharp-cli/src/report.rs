@@ -1,7 +1,9 @@
 //! The objects that `--json` prints. Keys are a contract: once printed, a key keeps its meaning.
 
 use serde::Serialize;
-use sharp_plan::{Episode, EpisodeEnd, Plan, PlannedLeg, Role, Tally};
+use sharp_drive::{EpisodeEnd, SuccessCount};
+use sharp_guide::Role;
+use sharp_plan::{Execution, Plan, PlannedOption};
 use sharp_space::{GridFrame, OccupancyGrid};
 
 use crate::progress::Stopwatch;
@@ -36,8 +38,8 @@ pub(crate) struct Verified {
     pub(crate) lower95: f64,
 }
 
-impl From<Tally> for Verified {
-    fn from(tally: Tally) -> Self {
+impl From<SuccessCount> for Verified {
+    fn from(tally: SuccessCount) -> Self {
         Self { episodes: tally.episodes, successes: tally.successes, lower95: tally.lower95() }
     }
 }
@@ -60,22 +62,18 @@ pub(crate) struct LegReport {
 }
 
 impl LegReport {
-    fn new(planned: &PlannedLeg, failure_cost_s: f64) -> Self {
-        let PlannedLeg { leg, learnt, reused, on_arrival } = planned;
+    fn new(planned: &PlannedOption, failure_cost_s: f64) -> Self {
+        let PlannedOption { option: leg, learnt, reused, on_arrival, .. } = planned;
         Self {
             option: leg.id.to_string(),
             from: leg.from.0,
             to: leg.to.0,
             role: leg.id.role(),
             reused: *reused,
-            policy: match learnt.policy {
-                sharp_plan::OptionPolicy::Follower(_) => "follower",
-                sharp_plan::OptionPolicy::Paced(_) => "paced",
-                sharp_plan::OptionPolicy::Learnt { .. } => "learnt",
-            },
+            policy: learnt.policy.kind(),
             env_steps: learnt.env_steps,
             gradient_steps: learnt.gradient_steps,
-            verified: learnt.verified.into(),
+            verified: learnt.estimate.count.into(),
             on_arrival: (*on_arrival).into(),
             length_m: leg.guide.length_m(),
             cost_s: learnt.cost_s(failure_cost_s),
@@ -168,7 +166,8 @@ impl SolveReport {
         let solution = &plan.solution;
         let (uses, reused) = solution.reuse();
         self.status = "solved";
-        self.plan = solution.legs.iter().map(|leg| LegReport::new(leg, plan.failure_cost_s)).collect();
+        self.plan =
+            solution.steps.iter().map(|step| LegReport::new(step, plan.method.failure_cost_s)).collect();
         self.reuse = Reuse { uses, reused };
         self.predicted = Some(Predicted {
             success: solution.predicted.rate(),
@@ -207,17 +206,17 @@ pub(crate) struct RunReport {
 }
 
 impl RunReport {
-    pub(crate) fn new(plan: &Plan, episodes: &[Episode]) -> Self {
+    pub(crate) fn new(plan: &Plan, episodes: &[Execution]) -> Self {
         let tally = sharp_plan::success(episodes);
         let count = |end: EpisodeEnd| episodes.iter().filter(|episode| episode.end == end).count() as u32;
-        let sum = |of: fn(&Episode) -> u32| episodes.iter().map(of).sum();
-        let reached: Vec<&Episode> =
+        let sum = |of: fn(&Execution) -> u32| episodes.iter().map(of).sum();
+        let reached: Vec<&Execution> =
             episodes.iter().filter(|episode| episode.end == EpisodeEnd::Reached).collect();
-        let mean = |of: fn(&Episode) -> f64| {
+        let mean = |of: fn(&Execution) -> f64| {
             reached.iter().map(|episode| of(episode)).sum::<f64>() / reached.len().max(1) as f64
         };
         let mut decisions: Vec<f64> =
-            episodes.iter().flat_map(|episode| episode.decisions_us.iter().copied()).collect();
+            episodes.iter().flat_map(|episode| episode.record.decisions_us.iter().copied()).collect();
         decisions.sort_by(f64::total_cmp);
         let quantile = |q: f64| {
             decisions
@@ -232,12 +231,12 @@ impl RunReport {
             success_rate: tally.rate(),
             lower95: tally.lower95(),
             upper95: tally.upper95(),
-            collisions: sum(|episode| episode.contacts),
+            collisions: sum(|episode| episode.record.contacts),
             timeouts: count(EpisodeEnd::TimedOut) + count(EpisodeEnd::Lost),
             strays: sum(|episode| episode.events.strays),
             recoveries: sum(|episode| episode.events.recoveries),
-            mean_sim_time_s: mean(|episode| episode.time_s),
-            mean_path_m: mean(|episode| episode.path_m),
+            mean_sim_time_s: mean(|episode| episode.record.time_s),
+            mean_path_m: mean(|episode| episode.record.path_m),
             predicted_success: plan.solution.predicted.rate(),
             decision_us: DecisionTimes { p50: quantile(0.5), p99: quantile(0.99) },
         }

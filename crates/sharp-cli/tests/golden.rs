@@ -20,7 +20,7 @@ use std::process::{Command, Stdio};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use serde_json::Value;
-use sharp_plan::Prior;
+use sharp_drive::Prior;
 use sharp_rl::ActorScratch;
 use sharp_sim::RobotModel;
 use sharp_space::Seed;

@@ -26,7 +26,11 @@ pub(crate) struct BandSettings<'a> {
 }
 
 /// Smooths the polyline `attempt` (units of cells); both ends stay.
-pub(crate) fn smooth(mask: &TraversableMask<'_>, attempt: &[Vector], settings: &BandSettings<'_>) -> Vec<Vector> {
+pub(crate) fn smooth(
+    mask: &TraversableMask<'_>,
+    attempt: &[Vector],
+    settings: &BandSettings<'_>,
+) -> Vec<Vector> {
     let resolution = mask.frame().resolution_m;
     let mut points = resample(attempt, COARSE_M / resolution, 4);
     let coarse = step_length(&points);

@@ -1,6 +1,8 @@
 //! Suites that every implementation of this crate's traits must pass, ours and anybody's.
 
-use sharp_space::{Cell, Footprint, FootprintChecker, OccupancyGrid, Point, Pose, RobotGeometry, Seed, Stream};
+use sharp_space::{
+    Cell, Footprint, FootprintChecker, OccupancyGrid, Point, Pose, RobotGeometry, Seed, Stream,
+};
 use thiserror::Error;
 
 use crate::guided_option::GuidedOption;

@@ -4,8 +4,8 @@ use sharp_motion::{Maneuver, Steering};
 use sharp_space::{CollisionChecker, Heading, Point, Pose, Vector};
 
 use crate::band::{self, BandSettings, COARSE_M};
-use crate::path::GuidePath;
 use crate::inflate::GuideRobot;
+use crate::path::GuidePath;
 use crate::request::{GuideEnd, GuideRequest, NoGuide};
 use crate::ridge::ridge;
 use crate::settings::GuideSettings;
@@ -63,7 +63,12 @@ impl<'a> GuideContext<'a> {
         let least_m = footprint.inscribed_radius_m() + margin_m;
         // The price of a cell divides by the difference.
         let comfort_m = (footprint.circumscribed_radius_m() + self.settings.comfort_m).max(least_m + 0.01);
-        TraversableMask { field: self.robot.geometry.clearance(), allowed: self.request.allowed, least_m, comfort_m }
+        TraversableMask {
+            field: self.robot.geometry.clearance(),
+            allowed: self.request.allowed,
+            least_m,
+            comfort_m,
+        }
     }
 
     /// Refuses a request whose ends are the same place.
@@ -133,7 +138,13 @@ impl<'a> GuideContext<'a> {
 
     /// The direction in the grid in which the path shall leave or reach an end, if one is wanted
     /// or only one fits. `points` run from the end inwards, `sign` is −1 at the goal.
-    fn end(&self, mask: &TraversableMask<'_>, end: &GuideEnd, points: &[Vector], sign: f64) -> Option<Vector> {
+    fn end(
+        &self,
+        mask: &TraversableMask<'_>,
+        end: &GuideEnd,
+        points: &[Vector],
+        sign: f64,
+    ) -> Option<Vector> {
         let frame = mask.frame();
         let coarse = COARSE_M / frame.resolution_m;
         let inward = points.iter().find(|&point| (point - points[0]).norm() >= 1.5 * coarse);
@@ -244,6 +255,11 @@ impl<'a> GuideContext<'a> {
     }
 
     fn is_allowed(&self, point: Point) -> bool {
-        self.robot.geometry.clearance().frame().cell_at(point).is_some_and(|cell| (self.request.allowed)(cell))
+        self.robot
+            .geometry
+            .clearance()
+            .frame()
+            .cell_at(point)
+            .is_some_and(|cell| (self.request.allowed)(cell))
     }
 }

@@ -63,7 +63,6 @@ impl LegId {
             Self::Direct => (None, None),
         }
     }
-
 }
 
 impl fmt::Display for LegId {
@@ -140,9 +139,10 @@ impl OptionSpace {
     #[must_use]
     pub fn allowed_states(&self, id: LegId, from: StateId, to: StateId) -> Vec<StateId> {
         match id {
-            LegId::Option(option) => self.options.get(option).map_or_else(Vec::new, |spec| {
-                self.options.allowed_states(spec, self.rule).collect()
-            }),
+            LegId::Option(option) => self
+                .options
+                .get(option)
+                .map_or_else(Vec::new, |spec| self.options.allowed_states(spec, self.rule).collect()),
             LegId::First(_) | LegId::Last(..) | LegId::Direct => vec![from, to],
         }
     }

@@ -67,7 +67,8 @@ mod tests {
 
     #[test]
     fn the_largest_margin_comes_first_and_the_robot_itself_last() {
-        let grid = OccupancyGrid::from_ascii(0.5, &["....................."; 9].join("\n")).expect("a drawing");
+        let grid =
+            OccupancyGrid::from_ascii(0.5, &["....................."; 9].join("\n")).expect("a drawing");
         for (radius_m, count) in [(0.0, 4), (0.4, 7)] {
             let footprint = Footprint::rectangle(0.5, 0.335).expect("an outline");
             let geometry: Arc<dyn RobotGeometry> = Arc::new(FootprintChecker::new(&grid, footprint));

@@ -2,12 +2,12 @@
 
 use sharp_space::{Point, Stream, Vector};
 
+use crate::context::{Attempt, GuideContext};
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
 use crate::request::{GuideRequest, NoGuide};
 use crate::sampled::sampled_guide;
 use crate::settings::{GuideSettings, PlannerKind};
-use crate::context::{Attempt, GuideContext};
 
 /// Plans the guide path of an option and checks it (definition 8).
 ///

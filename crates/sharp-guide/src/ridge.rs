@@ -199,8 +199,12 @@ mod tests {
     fn walls_and_forbidden_cells_have_no_way_through() {
         let grid = OccupancyGrid::from_ascii(1.0, "#####\n#.#.#\n#...#\n#####").unwrap();
         let field = DistanceField::new(&grid);
-        let mask =
-            TraversableMask { field: &field, allowed: &|cell| cell != Cell::new(2, 1), least_m: 0.3, comfort_m: 1.0 };
+        let mask = TraversableMask {
+            field: &field,
+            allowed: &|cell| cell != Cell::new(2, 1),
+            least_m: 0.3,
+            comfort_m: 1.0,
+        };
         assert_eq!(ridge(&mask, Cell::new(1, 1), Cell::new(3, 1), 1.0), None);
     }
 }

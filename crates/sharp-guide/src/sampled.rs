@@ -4,10 +4,10 @@ use rand::RngExt;
 use sharp_motion::{FromCells, Outcome, Path, Query, ShortcutSettings, Steering, learn_and_link, shortcut};
 use sharp_space::{Cell, Heading, Point, Pose, Stream, Vector};
 
-use crate::traversable::TraversableMask;
+use crate::context::{Attempt, CHECK_STEP_M, GuideContext};
 use crate::path::GuidePath;
 use crate::request::NoGuide;
-use crate::context::{CHECK_STEP_M, Attempt, GuideContext};
+use crate::traversable::TraversableMask;
 
 /// The least distance of two seeds, metres: about the width of a door.
 const SEED_SPACING_M: f64 = 0.8;
@@ -72,7 +72,8 @@ fn query(context: &GuideContext<'_>, mask: &TraversableMask<'_>, way: &[Vector])
     let (start, goal) = (context.request.start, context.request.goal);
     let near = way.len().min(8) - 1;
     let last = way.len() - 1;
-    let leaving = start.heading.unwrap_or_else(|| context.fitting_or(start.position, along(way[0], way[near])));
+    let leaving =
+        start.heading.unwrap_or_else(|| context.fitting_or(start.position, along(way[0], way[near])));
     let arriving =
         goal.heading.unwrap_or_else(|| context.fitting_or(goal.position, along(way[last - near], way[last])));
     Query { start: Pose::at(start.position, leaving), goal: Pose::at(goal.position, arriving) }

@@ -15,7 +15,8 @@ pub enum PlannerKind {
 }
 
 /// How guides are planned.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct GuideSettings {
     /// The threshold t of Definition 8, metres.
     pub spacing_m: f64,
@@ -36,7 +37,8 @@ pub struct GuideSettings {
     /// A robot whose heading is further off the path's than this is led onto it by a curve of its
     /// own, radians; one that can turn in place there just turns.
     pub start_turn_rad: f64,
-    /// Budget and steps of the sampling planner.
+    /// Budget and steps of the sampling planner; files do not keep it.
+    #[serde(skip)]
     pub sampling: RrtSettings,
     /// Seeds of Learn and Link: places with more clearance than their surroundings.
     pub seeds: usize,

@@ -66,7 +66,8 @@ impl TraversableMask<'_> {
         let (left, right, tx) = along(at.x, frame.width);
         let (below, above, ty) = along(at.y, frame.height);
         let at_cell = |col, row| self.clearance_m(Cell::new(col, row));
-        let (a, b, c, d) = (at_cell(left, below), at_cell(right, below), at_cell(left, above), at_cell(right, above));
+        let (a, b, c, d) =
+            (at_cell(left, below), at_cell(right, below), at_cell(left, above), at_cell(right, above));
         let value = (a * (1.0 - tx) + b * tx) * (1.0 - ty) + (c * (1.0 - tx) + d * tx) * ty;
         let dx = (b - a) * (1.0 - ty) + (d - c) * ty;
         let dy = (c - a) * (1.0 - tx) + (d - b) * tx;

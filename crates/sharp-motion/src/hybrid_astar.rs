@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::f64::consts::TAU;
 
-use sharp_space::{Cell, CollisionChecker, FootprintChecker, Point, Pose};
+use sharp_space::{Cell, CollisionChecker, Point, Pose, RobotGeometry};
 
 use crate::maneuver::Primitive;
 use crate::path::Path;
@@ -64,7 +64,7 @@ impl Default for HybridSettings {
 #[must_use]
 pub fn hybrid_astar(
     query: &Query,
-    checker: &FootprintChecker,
+    checker: &dyn RobotGeometry,
     steering: &Steering,
     settings: &HybridSettings,
 ) -> Outcome {
@@ -111,7 +111,7 @@ struct Node {
 }
 
 struct Search<'a> {
-    checker: &'a FootprintChecker,
+    checker: &'a dyn RobotGeometry,
     settings: &'a HybridSettings,
     /// Estimated cost of the rest for each cell, metres; infinite where there is no way.
     rest_m: &'a [f32],
@@ -124,8 +124,8 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(checker: &'a FootprintChecker, rest_m: &'a [f32], settings: &'a HybridSettings) -> Self {
-        let frame = checker.field().frame();
+    fn new(checker: &'a dyn RobotGeometry, rest_m: &'a [f32], settings: &'a HybridSettings) -> Self {
+        let frame = checker.clearance().frame();
         let bins = [frame.width, frame.height]
             .map(|cells| (cells as f64 * frame.resolution_m / settings.bin_m) as usize + 1);
         let best = vec![0; bins[0] * bins[1] * settings.headings];
@@ -133,7 +133,7 @@ impl<'a> Search<'a> {
     }
 
     fn bin(&self, pose: &Pose) -> usize {
-        let frame = self.checker.field().frame();
+        let frame = self.checker.clearance().frame();
         let at = frame.to_grid(pose.position) * (frame.resolution_m / self.settings.bin_m);
         let (col, row) = ((at.x as usize).min(self.bins[0] - 1), (at.y as usize).min(self.bins[1] - 1));
         let headings = self.settings.headings as i64;
@@ -142,7 +142,7 @@ impl<'a> Search<'a> {
     }
 
     fn push(&mut self, pose: Pose, cost_m: f64, (parent, primitive): (u32, Primitive)) {
-        let frame = self.checker.field().frame();
+        let frame = self.checker.clearance().frame();
         let Some(cell) = frame.cell_at(pose.position) else { return };
         let rest_m = f64::from(self.rest_m[frame.index(cell)]);
         let bin = self.bin(&pose);
@@ -178,7 +178,7 @@ impl<'a> Search<'a> {
         }
         let bend = if primitive.turn_rad == 0.0 { 1.0 } else { BEND_PRICE };
         let driven_m = bend * primitive.cost_m();
-        let price = price(self.checker, self.checker.field().sample(end.position), self.settings);
+        let price = price(self.checker, self.checker.clearance().sample(end.position), self.settings);
         self.push(end, cost_m + driven_m * price, (node, primitive));
     }
 
@@ -205,7 +205,7 @@ impl<'a> Search<'a> {
 }
 
 /// What a metre costs where the nearest blocked cell is `clearance_m` away.
-fn price(checker: &FootprintChecker, clearance_m: f64, settings: &HybridSettings) -> f64 {
+fn price(checker: &dyn RobotGeometry, clearance_m: f64, settings: &HybridSettings) -> f64 {
     let room_m = clearance_m - checker.footprint().inscribed_radius_m();
     let lack = (1.0 - room_m / settings.comfort_m).clamp(0.0, 1.0);
     1.0 + settings.clearance_weight * lack * lack
@@ -213,8 +213,8 @@ fn price(checker: &FootprintChecker, clearance_m: f64, settings: &HybridSettings
 
 /// For each cell the cost of the cheapest way to `goal` over cells as wide as the robot; `None` if the
 /// goal itself has no room.
-fn cost_to_go_m(checker: &FootprintChecker, goal: Point, settings: &HybridSettings) -> Option<Vec<f32>> {
-    let (field, frame) = (checker.field(), checker.field().frame());
+fn cost_to_go_m(checker: &dyn RobotGeometry, goal: Point, settings: &HybridSettings) -> Option<Vec<f32>> {
+    let (field, frame) = (checker.clearance(), checker.clearance().frame());
     // Distances between centres hide up to 1.21 cells; an estimate must not close a way that is open.
     let least_m =
         (checker.footprint().inscribed_radius_m() - 1.21 * frame.resolution_m).max(f64::MIN_POSITIVE);
@@ -254,7 +254,7 @@ mod tests {
 
     const CAR: Steering = Steering::Dubins { radius_m: 0.4 };
 
-    fn rooms() -> FootprintChecker {
+    fn rooms() -> RobotGeometry {
         let grid = OccupancyGrid::from_ascii(
             0.5,
             "
@@ -268,7 +268,7 @@ mod tests {
             ################",
         )
         .unwrap();
-        FootprintChecker::new(&grid, Footprint::rectangle(0.5, 0.3).unwrap())
+        RobotGeometry::new(&grid, Footprint::rectangle(0.5, 0.3).unwrap())
     }
 
     fn solve(steering: &Steering, start: Pose, goal: Pose) -> Path {

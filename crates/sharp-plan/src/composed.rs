@@ -1,47 +1,30 @@
 //! The composed policy Π: an automaton whose state is the option that is running.
 //!
-//! `Π(x) = π_i(x)` in controller state `q_i`, and `q_i → q_{i+1}` as soon as `x ∈ I_{o_{i+1}}`. The paper's
-//! automaton ends there. With recovery, a robot that strays, stands still or takes too long is
-//! placed again by α(x), and a new plan leads on from where it is with the policies at hand.
+//! `Π(x) = π_i(x)` in controller state `q_i`, and `q_i → q_{i+1}` as soon as `x ∈ I_{o_{i+1}}`. The paper's automaton
+//! ends there. With recovery, a robot that strays, stands still or takes too long is placed again by α(x), and a
+//! new plan leads on from where it is with the policies at hand.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use sharp_drive::{
+    Automaton, Controller, Decision, Follower, Link, Motion, Observation, OptionPolicy, Policy,
+    StandstillDetector,
+};
+use sharp_guide::{GuidedOption, LegId};
 use sharp_sim::RobotState;
-use sharp_space::Point;
 
-use crate::learn::LearningMode;
-use crate::leg::{Leg, LegId};
-use crate::percept::{Percept, Tracker};
-use crate::plan::Plan;
-use crate::planner::{Planner, Query, SearchSettings};
-use crate::policy::{DecisionScratch, Follower, GuideView, OptionPolicy, PolarWaypoint};
+use crate::plan_file::Plan;
+use crate::query::Query;
+use crate::search::Search;
+use crate::verify::PlannedOption;
 
 /// Actions outside the allowed states and off the guide before recovery begins: a few are noise.
 const STRAY_ACTIONS_MAX: u32 = 4;
-/// A robot nearer to its guide than this is on its way, whatever state it is in, metres.
+/// A robot nearer to its guide than this has not strayed, whatever state it is in, metres.
 const OFF_GUIDE_M: f64 = 0.6;
-/// Actions over which standing still is judged.
-const STILL_ACTIONS: u32 = 10;
-/// A robot that moved less than this over [`STILL_ACTIONS`], and turned less than
-/// [`STILL_TURN_RAD`], stands still, metres.
-const STILL_M: f64 = 0.1;
-const STILL_TURN_RAD: f64 = 0.3;
 /// Recoveries before the policy gives up.
 const RECOVERIES_MAX: u32 = 10;
-
-/// What the composed policy wants.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Decision {
-    /// Drive to this point next, at this speed (metres per second).
-    Waypoint(Point, f64),
-    /// The same, just after a new plan was made.
-    Recovering(Point, f64),
-    /// The goal is reached.
-    Reached,
-    /// No plan leads on from here.
-    Lost,
-}
 
 /// Counts of what went otherwise than planned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -52,51 +35,51 @@ pub struct Events {
     pub recoveries: u32,
 }
 
-/// A plan that is being run.
+/// A plan that is being run: a [`Controller`] for a simulator or, line by line, for a robot outside.
 #[derive(Debug)]
 pub struct ComposedPolicy {
     plan: Arc<Plan>,
     recovery: bool,
-    legs: Vec<(Arc<Leg>, Arc<OptionPolicy>)>,
-    current: usize,
-    percept: Percept,
-    tracker: Tracker,
-    actions: u32,
+    automaton: Automaton,
+    /// One for each option of the automaton.
+    policies: Vec<OptionPolicy>,
+    /// Options whose policy knows that it was entered.
+    entered: usize,
     stray_actions: u32,
-    anchor: (RobotState, u32),
+    still: StandstillDetector,
+    /// The robot has met an obstacle in this episode.
+    has_collided: bool,
+    /// The last decision came with a new plan.
+    is_recovering: bool,
     events: Events,
-    scratch: DecisionScratch,
 }
 
 impl ComposedPolicy {
     /// The composed policy of `plan` for a robot in `state`.
     #[must_use]
     pub fn new(plan: Arc<Plan>, state: RobotState, recovery: bool) -> Self {
-        let of = |planned: &crate::sharp::PlannedLeg| {
-            (Arc::clone(&planned.leg), Arc::new(planned.learnt.policy.clone()))
-        };
-        let legs: Vec<_> = plan.solution.legs.iter().map(of).collect();
-        let tracker = Tracker::start(&legs[0].0.guide, &state.pose);
-        let percept = Percept::first(state, &plan.noise);
+        let options: Vec<_> = plan.solution.steps.iter().map(|step| Arc::clone(&step.option)).collect();
+        let policies = plan.solution.steps.iter().map(|step| step.learnt.policy.clone()).collect();
+        let observation = Observation::first(state, &plan.noise);
+        let automaton = Automaton::new(Link::chain(&options).into(), observation);
         Self {
             plan,
             recovery,
-            legs,
-            current: 0,
-            percept,
-            tracker,
-            actions: 0,
+            automaton,
+            policies,
+            entered: 0,
             stray_actions: 0,
-            anchor: (state, 0),
+            still: StandstillDetector::new(state.pose),
+            has_collided: false,
+            is_recovering: false,
             events: Events::default(),
-            scratch: DecisionScratch::default(),
         }
     }
 
-    /// The leg that is running.
+    /// The option that is running.
     #[must_use]
-    pub fn leg(&self) -> &Leg {
-        &self.legs[self.current].0
+    pub fn option(&self) -> &GuidedOption {
+        &self.automaton.link().option
     }
 
     /// What went otherwise than planned so far.
@@ -105,115 +88,124 @@ impl ComposedPolicy {
         self.events
     }
 
-    /// What to do next.
-    pub fn decide(&mut self) -> Decision {
-        if !self.advance() {
-            return Decision::Reached;
-        }
-        let in_trouble = self.stray_actions >= STRAY_ACTIONS_MAX || self.stands_still() || self.is_overdue();
-        let recovering = in_trouble && self.recovery;
-        if in_trouble && (!self.recovery || !self.recover()) {
-            // Without recovery the automaton drives on while straying; it only ends when time is up.
-            if self.recovery || self.is_overdue() {
-                return Decision::Lost;
-            }
-        }
-        let command = self.command();
-        self.percept.last_command = command;
-        let waypoint = command.to_world(&self.percept.state.pose);
-        if recovering {
-            Decision::Recovering(waypoint, command.speed_mps)
-        } else {
-            Decision::Waypoint(waypoint, command.speed_mps)
-        }
+    /// Returns true if the last decision came with a new plan.
+    #[must_use]
+    pub const fn is_recovering(&self) -> bool {
+        self.is_recovering
     }
 
-    /// Tells the policy where its last waypoint brought the robot.
-    pub fn observe(&mut self, after: RobotState) {
-        let (leg, _) = &self.legs[self.current];
-        self.percept = self.percept.next(&self.plan.workspace, self.percept.last_command, after);
-        self.tracker.update(&leg.guide, &after.pose);
-        self.actions += 1;
-        if leg.is_allowed(&after.pose) {
-            self.stray_actions = 0;
-        } else {
-            self.stray_actions += u32::from(self.tracker.cross_track_m.abs() > OFF_GUIDE_M);
-            self.events.strays += 1;
-        }
-        let (anchor, since) = self.anchor;
-        let turned = anchor.pose.heading.turn_to(after.pose.heading).abs();
-        let moved = anchor.pose.distance_m(&after.pose) > STILL_M || turned > STILL_TURN_RAD;
-        self.anchor = if moved { (after, 0) } else { (anchor, since + 1) };
+    /// What the robot knows of itself.
+    #[must_use]
+    pub const fn observation(&self) -> &Observation {
+        self.automaton.observation()
     }
 
     /// `q_i → q_{i+1}` while the robot is in the next initiation set; false at the goal.
     fn advance(&mut self) -> bool {
-        while self.legs[self.current].0.is_done(&self.percept.state.pose) {
-            if self.current + 1 == self.legs.len() {
-                return false;
-            }
-            self.enter(self.current + 1);
+        let before = self.automaton.index();
+        let runs = self.automaton.advance();
+        if self.automaton.index() != before {
+            self.begin_option();
         }
-        true
+        runs
     }
 
-    fn enter(&mut self, index: usize) {
-        self.current = index;
-        self.tracker = Tracker::start(&self.legs[index].0.guide, &self.percept.state.pose);
-        (self.actions, self.stray_actions) = (0, 0);
-        self.anchor = (self.percept.state, 0);
+    fn begin_option(&mut self) {
+        self.stray_actions = 0;
+        self.still = StandstillDetector::new(self.automaton.observation().state.pose);
     }
 
-    fn command(&mut self) -> PolarWaypoint {
-        let (leg, policy) = &self.legs[self.current];
-        let next = self.legs.get(self.current + 1).map(|(leg, _)| &leg.guide);
-        let view = GuideView { guide: &leg.guide, next };
-        policy.decide(&self.plan.workspace, &self.percept, &self.tracker, &view, &mut self.scratch)
+    /// The decision of the option's policy.
+    fn drive(&mut self) -> Decision {
+        let (index, situation) = (self.automaton.index(), self.automaton.situation(&self.plan.world));
+        let policy = &mut self.policies[index];
+        if self.entered <= index {
+            self.entered = index + 1;
+            policy.enter(&situation);
+        }
+        Decision::Drive(policy.decide(&situation))
     }
 
-    const fn stands_still(&self) -> bool {
-        self.anchor.1 >= STILL_ACTIONS
-    }
-
-    fn is_overdue(&self) -> bool {
-        self.actions > self.leg().horizon_actions(crate::SLOWEST_REACH_M)
-    }
-
-    /// α(x) again, and a plan from here with the policies at hand; legs without one are followed slowly.
+    /// A new plan from here; false if there is none, or too many were made.
     fn recover(&mut self) -> bool {
         if self.events.recoveries >= RECOVERIES_MAX {
             return false;
         }
         self.events.recoveries += 1;
-        let plan = Arc::clone(&self.plan);
-        let query = Query { start: self.percept.state.pose, goal: plan.solution.query.goal };
-        let passing = plan.learning != LearningMode::Paper;
-        let settings = SearchSettings { passing, ..SearchSettings::new(&plan.workspace) };
-        let known: BTreeMap<LegId, &crate::sharp::PlannedLeg> = plan
+        let Some((options, policies)) = self.replan() else { return false };
+        let observation = *self.automaton.observation();
+        self.automaton = Automaton::new(Link::chain(&options).into(), observation);
+        (self.policies, self.entered) = (policies, 0);
+        self.begin_option();
+        true
+    }
+
+    /// α(x) again, and a plan with the policies at hand; options without one are followed slowly.
+    fn replan(&self) -> Option<(Vec<Arc<GuidedOption>>, Vec<OptionPolicy>)> {
+        let plan = &*self.plan;
+        let query = Query { start: self.automaton.observation().state.pose, goal: plan.solution.query.goal };
+        let known: BTreeMap<LegId, &PlannedOption> = plan
             .solution
-            .legs
+            .steps
             .iter()
-            .filter(|planned| matches!(planned.leg.id, LegId::Option(_) | LegId::Last(..)))
-            .map(|planned| (planned.leg.id, planned))
+            .filter(|step| matches!(step.option.id, LegId::Option(_) | LegId::Last(..)))
+            .map(|step| (step.option.id, step))
             .collect();
-        let guides = known.iter().map(|(&id, planned)| (id, planned.leg.guide.clone()));
+        let guides = known.iter().map(|(&id, step)| (id, step.option.guide.clone()));
         let seed = plan.seed.child("recovery", u64::from(self.events.recoveries));
-        let Ok(mut planner) = Planner::new(&plan.workspace, &plan.abstraction, settings, query, guides, seed)
-        else {
-            return false;
+        let mut search =
+            Search::new(&plan.world, &plan.abstraction, &plan.method, query, guides, seed).ok()?;
+        let cost_s = |id: LegId| known.get(&id).map(|step| step.learnt.cost_s(plan.method.failure_cost_s));
+        let options = search.plan(&cost_s, &())?;
+        let cautious = || OptionPolicy::Follower(Follower::cautious(&plan.world.robot));
+        let policy = |option: &Arc<GuidedOption>| {
+            known.get(&option.id).map_or_else(cautious, |step| step.learnt.policy.clone())
         };
-        let cost = |id: LegId| known.get(&id).map(|planned| planned.learnt.cost_s(plan.failure_cost_s));
-        let Some(legs) = planner.plan(&cost, &()) else { return false };
-        let cautious = Arc::new(OptionPolicy::Follower(Follower::cautious(&plan.workspace.robot)));
-        self.legs = legs
-            .into_iter()
-            .map(|leg| {
-                let learnt = known.get(&leg.id).map(|planned| Arc::new(planned.learnt.policy.clone()));
-                (leg, learnt.unwrap_or_else(|| Arc::clone(&cautious)))
-            })
-            .collect();
-        self.enter(0);
-        self.advance()
+        let policies = options.iter().map(policy).collect();
+        Some((options, policies))
+    }
+}
+
+impl Controller for ComposedPolicy {
+    fn decide(&mut self) -> Decision {
+        self.is_recovering = false;
+        if !self.advance() {
+            return Decision::Reached;
+        }
+        let is_late = self.automaton.is_late();
+        if self.stray_actions < STRAY_ACTIONS_MAX && !self.still.stands_still() && !is_late {
+            return self.drive();
+        }
+        if !self.recovery {
+            // The paper's automaton drives on while it strays; it only ends when time is up.
+            return if is_late { Decision::Lost } else { self.drive() };
+        }
+        if !self.recover() {
+            return Decision::Lost;
+        }
+        if !self.advance() {
+            return Decision::Reached;
+        }
+        self.is_recovering = true;
+        // Out of contact first: a forward-only robot with its nose at a wall cannot turn.
+        if self.has_collided && self.plan.world.robot.recovery_reverse_m > 0.0 {
+            return Decision::BackOff;
+        }
+        self.drive()
+    }
+
+    fn observe(&mut self, motion: &Motion) {
+        self.automaton.observe(&self.plan.world, motion);
+        self.has_collided |= motion.contact && motion.command.is_some();
+        let pose = &motion.after.pose;
+        self.still.observe(pose);
+        if self.automaton.link().option.is_allowed(pose) {
+            self.stray_actions = 0;
+        } else {
+            let is_off = self.automaton.progress().cross_track_m.abs() > OFF_GUIDE_M;
+            self.stray_actions += u32::from(is_off);
+            self.events.strays += 1;
+        }
     }
 }
 
@@ -223,24 +215,32 @@ mod tests {
     use sharp_space::Pose;
 
     use super::*;
-    use crate::drawn::plan;
+    use crate::test_worlds::plan;
 
     fn at(x: f64, y: f64) -> RobotState {
         RobotState::at_rest(Pose::new(x, y, 0.0))
     }
 
-    /// Carries a robot from waypoint to waypoint and returns the legs it ran, in order.
+    /// The robot is in `state` after the last command.
+    fn arrive(policy: &mut ComposedPolicy, state: RobotState) {
+        let command = policy.observation().last_command;
+        policy.observe(&Motion::commanded(command, state));
+    }
+
+    /// Carries a robot from waypoint to waypoint and returns the options it ran, in order.
     fn carry(policy: &mut ComposedPolicy, mut state: RobotState) -> (Decision, Vec<String>) {
-        let mut legs = vec![policy.leg().id.to_string()];
+        let mut legs = vec![policy.option().id.to_string()];
         for _ in 0..500 {
             let decision = policy.decide();
-            legs.push(policy.leg().id.to_string());
+            legs.push(policy.option().id.to_string());
             match decision {
-                Decision::Waypoint(point, _) | Decision::Recovering(point, _) => {
+                Decision::Drive(command) => {
+                    let point = command.to_world(&state.pose);
                     let towards = point - state.pose.position;
                     state = RobotState::at_rest(Pose::new(point.x, point.y, towards.y.atan2(towards.x)));
-                    policy.observe(state);
+                    arrive(policy, state);
                 }
+                Decision::BackOff => panic!("nobody met a wall"),
                 Decision::Reached | Decision::Lost => {
                     legs.dedup();
                     return (decision, legs);
@@ -271,14 +271,14 @@ mod tests {
     fn an_initiation_set_is_entered_at_once_and_those_passed_by_are_skipped() {
         let mut policy = ComposedPolicy::new(plan(OptionKind::Centroid), at(1.0, 2.2), false);
         policy.decide();
-        let second = policy.plan.solution.legs[1].leg.target.center();
-        policy.observe(at(second.x, second.y));
+        let second = policy.plan.solution.steps[1].option.target.center();
+        arrive(&mut policy, at(second.x, second.y));
         policy.decide();
-        assert_eq!(policy.leg().id.to_string(), "first:0", "I of the first option was not reached");
-        let first = policy.plan.solution.legs[0].leg.target.center();
-        policy.observe(at(first.x, first.y));
+        assert_eq!(policy.option().id.to_string(), "first:0", "I of the first option was not reached");
+        let first = policy.plan.solution.steps[0].option.target.center();
+        arrive(&mut policy, at(first.x, first.y));
         policy.decide();
-        assert_eq!(policy.leg().id.to_string(), "c:0-1", "x is in the first option's I");
+        assert_eq!(policy.option().id.to_string(), "c:0-1", "x is in the first option's I");
     }
 
     #[test]
@@ -288,14 +288,14 @@ mod tests {
             policy.decide();
             // Into the last region's state, far from the first guide.
             for index in 0..STRAY_ACTIONS_MAX {
-                policy.observe(at(8.2 + 0.2 * f64::from(index), 1.0));
+                arrive(&mut policy, at(8.2 + 0.2 * f64::from(index), 1.0));
             }
             let decision = policy.decide();
-            let recovered = matches!(decision, Decision::Recovering(..));
+            let recovered = policy.is_recovering();
             assert_eq!(recovered, recovery, "{decision:?}");
             assert_eq!(policy.events().strays, STRAY_ACTIONS_MAX, "each stray counts");
             assert_eq!(policy.events().recoveries, u32::from(recovery), "new plans");
-            let from = policy.leg().from;
+            let from = policy.option().from;
             let expected = if recovery { 2 } else { 0 };
             assert_eq!(from.0, expected, "the leg that runs leaves the state the robot is in, with recovery");
         }
@@ -307,7 +307,7 @@ mod tests {
             let mut policy = ComposedPolicy::new(plan(OptionKind::Centroid), at(1.0, 2.2), recovery);
             let mut decisions = 0;
             while policy.decide() != Decision::Lost {
-                policy.observe(at(1.0, 2.2));
+                arrive(&mut policy, at(1.0, 2.2));
                 decisions += 1;
                 assert!(decisions < 1000, "never given up");
             }

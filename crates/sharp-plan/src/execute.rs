@@ -3,20 +3,24 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_sim::{ActionSettings, AnySim, NoiseModel, RobotState, SimulatorKind, Vehicle};
-use sharp_space::{Pose, Seed};
+use sharp_drive::{Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, SuccessCount, TIME_LIMIT_MIN_S, Wall};
+use sharp_sim::{NoiseModel, RobotState, Simulator, SimulatorKind};
+use sharp_space::Seed;
 
-use crate::composed::{ComposedPolicy, Decision, Events};
-use crate::plan::Plan;
-use crate::stats::Tally;
+use crate::composed::{ComposedPolicy, Events};
+use crate::plan_file::Plan;
+
+/// The time limit of an episode, in units of the predicted time.
+const TIME_LIMIT_FACTOR: f64 = 3.0;
 
 /// How a plan is run.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct RunSettings {
     /// Number of episodes.
     pub episodes: u32,
-    /// The simulator.
-    pub simulator: SimulatorKind,
+    /// The simulator; episodes run in forks of it.
+    pub simulator: Box<dyn Simulator>,
     /// Its noise.
     pub noise: NoiseModel,
     /// Whether a robot that strayed, stands still or is late gets a new plan.
@@ -36,127 +40,52 @@ impl RunSettings {
     pub fn new(plan: &Plan, episodes: u32, seed: Seed) -> Self {
         Self {
             episodes,
-            simulator: SimulatorKind::Planar,
+            simulator: plan.world.simulator(SimulatorKind::Planar),
             noise: plan.noise.clone(),
             recovery: true,
             contact_ends: true,
-            time_limit_s: (3.0 * plan.solution.predicted_time_s).max(60.0),
+            time_limit_s: (TIME_LIMIT_FACTOR * plan.solution.predicted_time_s).max(TIME_LIMIT_MIN_S),
             seed,
         }
     }
 }
 
-/// Why an episode ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EpisodeEnd {
-    /// At the goal.
-    Reached,
-    /// Against a wall.
-    Collided,
-    /// At the time limit.
-    TimedOut,
-    /// Where no plan leads on.
-    Lost,
-}
-
-/// One episode.
+/// One execution of a plan.
 #[derive(Clone, Debug)]
-pub struct Episode {
+pub struct Execution {
     /// Why it ended.
     pub end: EpisodeEnd,
-    /// Simulated time, seconds.
-    pub time_s: f64,
-    /// Distance driven, metres.
-    pub path_m: f64,
-    /// Collisions with a wall, however the episode went on.
-    pub contacts: u32,
+    /// What happened.
+    pub record: EpisodeRecord,
     /// What went otherwise than planned.
     pub events: Events,
-    /// The pose after each action, the start first.
-    pub trace: Vec<Pose>,
-    /// Wall time of each decision, microseconds.
-    pub decisions_us: Vec<f64>,
 }
 
-/// Runs `plan`; `clock_us` tells the wall time in microseconds. Episodes come in order.
+/// Runs `plan`; `clock_us` tells the wall time in microseconds. Executions come in order.
 #[must_use]
-pub fn run(plan: &Arc<Plan>, settings: &RunSettings, clock_us: &(dyn Fn() -> f64 + Sync)) -> Vec<Episode> {
-    let workspace = &plan.workspace;
-    let actions = ActionSettings { stop_at_contact: settings.contact_ends, ..ActionSettings::default() };
-    let sim = AnySim::new(settings.simulator, Arc::clone(&workspace.world), &workspace.robot);
-    let vehicle = Vehicle::new(sim, Arc::clone(&workspace.robot), settings.noise.clone(), actions);
-    (0..settings.episodes)
-        .into_par_iter()
-        .map(|episode| {
-            let mut vehicle = vehicle.clone();
-            vehicle.reset(RobotState::at_rest(plan.solution.query.start), settings.seed, u64::from(episode));
-            run_episode(plan, settings, vehicle, clock_us)
-        })
-        .collect()
-}
-
-fn run_episode(
-    plan: &Arc<Plan>,
-    settings: &RunSettings,
-    mut vehicle: Vehicle<AnySim>,
-    clock_us: &dyn Fn() -> f64,
-) -> Episode {
-    let start = *vehicle.state();
-    let mut policy = ComposedPolicy::new(Arc::clone(plan), start, settings.recovery);
-    let mut episode = Episode {
-        end: EpisodeEnd::TimedOut,
-        time_s: 0.0,
-        path_m: 0.0,
-        contacts: 0,
-        events: Events::default(),
-        trace: vec![start.pose],
-        decisions_us: vec![],
+pub fn run(plan: &Arc<Plan>, settings: &RunSettings, clock_us: &(dyn Fn() -> f64 + Sync)) -> Vec<Execution> {
+    let rules = EpisodeRules::default()
+        .with_contact_ends(settings.contact_ends)
+        .with_time_limit_s(settings.time_limit_s)
+        .with_trace();
+    let vehicle = plan.world.vehicle(&*settings.simulator, &settings.noise, settings.contact_ends);
+    let episode = Episode::new(vehicle, rules);
+    let wall = Wall { clock_us, ..Wall::silent() };
+    let start = RobotState::at_rest(plan.solution.query.start);
+    let execute = |number: u32| {
+        let mut episode = episode.clone();
+        episode.begin(start, settings.seed, u64::from(number));
+        let mut policy = ComposedPolicy::new(Arc::clone(plan), start, settings.recovery);
+        let end = episode.drive(&mut policy, &wall);
+        Execution { end, record: episode.into_record(), events: policy.events() }
     };
-    while episode.time_s < settings.time_limit_s {
-        let before_us = clock_us();
-        let decision = policy.decide();
-        episode.decisions_us.push(clock_us() - before_us);
-        let (waypoint, speed_mps) = match decision {
-            Decision::Waypoint(waypoint, speed_mps) => (waypoint, speed_mps),
-            Decision::Recovering(waypoint, speed_mps) => {
-                let reverse_m = plan.workspace.robot.recovery_reverse_m;
-                if episode.contacts > 0 && reverse_m > 0.0 {
-                    // Out of contact first: a forward-only robot with its nose at a wall cannot turn.
-                    let report = vehicle.back_off(reverse_m);
-                    episode.time_s += report.time_s;
-                    policy.observe(report.after);
-                    continue;
-                }
-                (waypoint, speed_mps)
-            }
-            Decision::Reached => {
-                episode.end = EpisodeEnd::Reached;
-                break;
-            }
-            Decision::Lost => {
-                episode.end = EpisodeEnd::Lost;
-                break;
-            }
-        };
-        let report = vehicle.act_at(waypoint, speed_mps);
-        episode.time_s += report.time_s;
-        episode.path_m += report.path_m;
-        episode.trace.push(report.after.pose);
-        episode.contacts += u32::from(report.contact);
-        if report.contact && settings.contact_ends {
-            episode.end = EpisodeEnd::Collided;
-            break;
-        }
-        policy.observe(report.after);
-    }
-    episode.events = policy.events();
-    episode
+    (0..settings.episodes).into_par_iter().map(execute).collect()
 }
 
-/// Successes among `episodes`.
+/// Successes among `executions`.
 #[must_use]
-pub fn success(episodes: &[Episode]) -> Tally {
-    Tally::count(episodes.iter().map(|episode| episode.end == EpisodeEnd::Reached))
+pub fn success(executions: &[Execution]) -> SuccessCount {
+    SuccessCount::count(executions.iter().map(|execution| execution.end == EpisodeEnd::Reached))
 }
 
 #[cfg(test)]
@@ -164,9 +93,9 @@ mod tests {
     use sharp_options::OptionKind;
 
     use super::*;
-    use crate::drawn::plan;
+    use crate::test_worlds::plan;
 
-    fn episodes(settings: impl Fn(RunSettings) -> RunSettings) -> Vec<Episode> {
+    fn episodes(settings: impl Fn(RunSettings) -> RunSettings) -> Vec<Execution> {
         let plan = plan(OptionKind::Centroid);
         run(&plan, &settings(RunSettings::new(&plan, 3, Seed(1))), &|| 0.0)
     }
@@ -174,13 +103,19 @@ mod tests {
     #[test]
     fn without_noise_the_plan_holds_in_both_simulators() {
         for simulator in [SimulatorKind::Planar, SimulatorKind::Kinematic] {
-            let episodes = episodes(|settings| RunSettings { simulator, ..settings });
-            assert_eq!(success(&episodes), Tally { episodes: 3, successes: 3 }, "{simulator:?}");
+            let world = plan(OptionKind::Centroid).world.clone();
+            let episodes =
+                episodes(|settings| RunSettings { simulator: world.simulator(simulator), ..settings });
+            assert_eq!(success(&episodes), SuccessCount { episodes: 3, successes: 3 }, "{simulator:?}");
             for episode in &episodes {
-                assert!((6.0..10.0).contains(&episode.path_m), "{simulator:?}: 8 m are {} m", episode.path_m);
-                assert_eq!(episode.contacts, 0, "{simulator:?}");
                 assert!(
-                    episode.decisions_us.len() >= episode.trace.len(),
+                    (6.0..10.0).contains(&episode.record.path_m),
+                    "{simulator:?}: 8 m are {} m",
+                    episode.record.path_m
+                );
+                assert_eq!(episode.record.contacts, 0, "{simulator:?}");
+                assert!(
+                    episode.record.decisions_us.len() >= episode.record.trace.len(),
                     "{simulator:?}: a decision a pose"
                 );
             }
@@ -200,7 +135,7 @@ mod tests {
             let noise = NoiseModel::by_name("harsh").expect("a built-in noise");
             let episodes =
                 episodes(|settings| RunSettings { noise: noise.clone(), seed: Seed(seed), ..settings });
-            episodes.into_iter().map(|episode| episode.trace).collect::<Vec<_>>()
+            episodes.into_iter().map(|episode| episode.record.trace).collect::<Vec<_>>()
         };
         let first = noisy(1);
         assert_eq!(first, noisy(1), "equal seeds");

@@ -1,60 +1,78 @@
-//! Algorithm 1: search, learning, the composed policy and the option library.
+//! SHARP whole: Algorithm 1, its search, the learning of options, the composed policy and the option library.
 //!
-//! [`solve`] takes a [`Workspace`] (map and robot), an [`Abstraction`] (diagram and options) and a
-//! [`Query`], searches a plan of options with A*, learns the policies that the [`OptionLibrary`]
-//! lacks and returns a [`Solution`] with its measured odds. A [`Plan`] keeps a solution in a folder;
-//! [`run`] drives it in a simulator, and a [`ComposedPolicy`] drives anything else.
+//! The nouns: [`Sharp`] is a robot in a building that solves problem after problem. A [`Method`] says how, as data;
+//! an [`OptionLearner`] gives an option its policy. A [`Plan`] is a policy composed of options with its measured
+//! probability of success. [`run`] drives it in a simulator, a [`ComposedPolicy`] drives anything else, and an
+//! [`OptionLibrary`] keeps what was learnt. Algorithm 1 itself is [`solve`].
+//!
+//! ```
+//! use std::sync::Arc;
+//! use sharp_drive::World;
+//! use sharp_plan::{Answer, Method, Query, RunSettings, Sharp, run, success};
+//! use sharp_sim::{NoiseModel, RobotModel};
+//! use sharp_space::{Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose, Region, RegionId, Seed};
+//!
+//! // Two critical regions, in the middle of either half; sharp-regions has detectors that look for themselves.
+//! let detector = |grid: &OccupancyGrid, _: &Footprint| {
+//!     let field = DistanceField::new(grid);
+//!     let region = |id, col| Region::new(RegionId(id), vec![Cell::new(col, 5)], &field).unwrap();
+//!     Detection::new(vec![region(0, 6), region(1, 18)], "list")
+//! };
+//! let grid = OccupancyGrid::from_ascii(0.4, &["........................."; 10].join("\n")).unwrap();
+//! let world = World::new(grid, RobotModel::husky());
+//! let mut sharp = Sharp::new(world, detector)
+//!     .with_method(Method::prior().with_episodes(50, 50, 50))
+//!     .with_noise(NoiseModel::none());
+//! let query = Query { start: Pose::new(1.5, 2.0, 0.0), goal: Pose::new(8.5, 2.0, 0.0) };
+//! let Answer::Solved(plan) = sharp.solve(query, &())? else { panic!("an open hall") };
+//! assert!(plan.solution.predicted.rate() > 0.9, "{:?}", plan.solution.predicted);
+//!
+//! let plan = Arc::new(*plan);
+//! let executions = run(&plan, &RunSettings::new(&plan, 5, Seed(2)), &|| 0.0);
+//! assert_eq!(success(&executions).successes, 5);
+//! # Ok::<(), sharp_plan::SolveError>(())
+//! ```
 
-mod baseline;
-mod belief;
-mod certify;
+mod abstraction;
+mod algorithm;
 mod composed;
+mod conditions;
 mod execute;
 mod files;
 mod learn;
-mod leg;
 mod library;
-mod model;
-mod pace;
-mod percept;
-mod plan;
-mod planner;
-mod policy;
-pub mod prior;
-mod rollout;
+mod method;
+mod option_graph;
+mod plan_file;
+mod policies;
+mod problem;
+mod query;
+mod repair;
 mod search;
 mod sharp;
-mod spare;
-mod starts;
-mod stats;
-mod task;
+mod training_route;
+mod verify;
 
 #[cfg(test)]
-mod drawn;
+mod test_worlds;
 
-pub use baseline::{
-    Baseline, ComparisonSettings, Driven, Host, Mppi, MppiSettings, Pilot, Readiness, RoutePlanner, Rrt, Sac,
-    SacBudget, Situation, Track, compare,
-};
-pub use certify::{Certificate, FAILURE_COST_S, Trial};
-pub use composed::{ComposedPolicy, Decision, Events};
-pub use execute::{Episode, EpisodeEnd, RunSettings, run, success};
+pub use abstraction::{Abstraction, AbstractionSettings, construct};
+pub use algorithm::{Outcome, solve};
+pub use composed::{ComposedPolicy, Events};
+pub use conditions::Conditions;
+pub use execute::{Execution, RunSettings, run, success};
 pub use files::{FileError, hash, read_ron, write_atomic, write_ron};
-pub use learn::{LearnFailure, LearnSettings, LearningMode, Learnt, Lesson, LessonMonitor, RewardMode};
-pub use leg::{Leg, LegId, Role, Target};
+pub use learn::{
+    LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner, PaperProtocol, PriorOnly,
+    Selection,
+};
 pub use library::{FORMAT, OptionLibrary, StoredOption};
-pub use pace::{PacedFollower, SpeedRule};
-pub use percept::{Expectation, Percept, Tracker, Workspace};
-pub use plan::{AbstractionFile, Plan, map_hash};
-pub use planner::{Abstraction, Planner, Query, SearchSettings, Unplaced};
-pub use policy::{Correction, DecisionScratch, Follower, Form, GuideView, OptionPolicy, PolarWaypoint, Rule};
-pub use prior::Prior;
-pub use rollout::{ChainRun, Driver, LegEnd, LegOutcome, drive_chain};
-pub use search::{Candidate, OptionGraph};
-pub use sharp::{Monitor, Outcome, Phase, PlannedLeg, Solution, SolveSettings, kind_name, solve};
-pub use starts::{StartSpread, Starts};
-pub use stats::Tally;
-pub use task::LegTask;
-
-/// The slowest waypoint distance that a policy may choose all the way and still be in time, metres.
-pub const SLOWEST_REACH_M: f64 = 0.15;
+pub use method::{LearningOrder, Method, RepairSettings, SearchSettings};
+pub use option_graph::{Candidate, OptionGraph};
+pub use plan_file::{AbstractionFile, Plan, map_hash};
+pub use problem::Problem;
+pub use query::{Monitor, Phase, Query};
+pub use search::{Search, Unplaced};
+pub use sharp::{Answer, Sharp, SolveError};
+pub use training_route::{RouteScenarios, TrainingRoute, prior_train_settings, training_routes};
+pub use verify::{PlannedOption, Solution};

@@ -8,17 +8,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+use sharp_drive::{
+    Follower, NetworkPolicy, OptionPolicy, PolicyInterface, ProfiledFollower, SuccessCount, SuccessEstimate,
+};
 use sharp_guide::GuidePath;
 use sharp_options::OptionId;
 use sharp_rl::Actor;
 
 use crate::files::{self, FileError};
-use crate::learn::Learnt;
-use crate::pace::PacedFollower;
-use crate::policy::{Follower, Form, OptionPolicy};
-use crate::stats::Tally;
+use crate::learn::LearntPolicy;
 
 /// Raised whenever the files change their meaning.
 pub const FORMAT: u32 = 3;
@@ -28,12 +29,15 @@ pub const FORMAT: u32 = 3;
 pub(crate) enum PolicyFile {
     /// A follower needs nothing but its settings.
     Follower(Follower),
-    /// Nor does a paced one.
-    Paced(PacedFollower),
-    /// A learnt policy and the file of its weights.
-    Learnt {
+    /// Nor does one with a speed profile.
+    #[serde(rename = "Paced")]
+    Profiled(ProfiledFollower),
+    /// A network and the file of its weights.
+    #[serde(rename = "Learnt")]
+    Network {
         /// What it sees and does.
-        form: Form,
+        #[serde(rename = "form")]
+        interface: PolicyInterface,
         /// File name of the weights, in the same folder.
         weights: String,
     },
@@ -43,10 +47,15 @@ impl PolicyFile {
     pub(crate) fn save(policy: &OptionPolicy, folder: &Path) -> Result<Self, FileError> {
         Ok(match policy {
             OptionPolicy::Follower(follower) => Self::Follower(*follower),
-            OptionPolicy::Paced(paced) => Self::Paced(*paced),
-            OptionPolicy::Learnt { form, actor } => {
+            OptionPolicy::Profiled(follower) => Self::Profiled(*follower),
+            OptionPolicy::Network(NetworkPolicy { interface, actor, .. }) => {
                 let bytes = actor.to_bytes(&BTreeMap::new());
-                Self::Learnt { form: *form, weights: files::write_blob(folder, &bytes, "safetensors")? }
+                let weights = files::write_blob(folder, &bytes, "safetensors")?;
+                Self::Network { interface: *interface, weights }
+            }
+            OptionPolicy::Custom(policy) => {
+                let problem = format!("a policy from outside cannot be stored: {policy:?}");
+                return Err(FileError::content(folder, problem));
             }
         })
     }
@@ -54,17 +63,19 @@ impl PolicyFile {
     pub(crate) fn load(&self, folder: &Path) -> Result<OptionPolicy, FileError> {
         Ok(match self {
             Self::Follower(follower) => OptionPolicy::Follower(*follower),
-            Self::Paced(paced) => OptionPolicy::Paced(*paced),
-            Self::Learnt { form, weights } => {
+            Self::Profiled(follower) => OptionPolicy::Profiled(*follower),
+            Self::Network { interface, weights } => {
                 let bytes = files::read_blob(folder, weights)?;
                 let path = folder.join(weights);
                 let (actor, _) =
                     Actor::from_bytes(&bytes).map_err(|error| FileError::content(&path, error))?;
                 let spec = actor.spec();
-                if spec.observation_len != form.observation_len() || spec.action_len != 2 {
-                    return Err(FileError::content(&path, "the network does not fit the policy's form"));
+                if spec.observation_len != interface.observation_len()
+                    || spec.action_len != PolicyInterface::ACTION_LEN
+                {
+                    return Err(FileError::content(&path, "the network does not fit the policy's interface"));
                 }
-                OptionPolicy::Learnt { form: *form, actor: Box::new(actor) }
+                OptionPolicy::Network(NetworkPolicy::new(*interface, Arc::new(actor)))
             }
         })
     }
@@ -75,9 +86,9 @@ impl PolicyFile {
 pub struct StoredOption {
     /// Its guide path.
     pub guide: GuidePath,
-    /// Its policy with its certificate.
-    pub learnt: Learnt,
-    /// The hash of all that the two depend on ([`Leg::corridor`](crate::Leg::corridor)).
+    /// Its policy with its estimate.
+    pub learnt: LearntPolicy,
+    /// The hash of all that the two depend on ([`GuidedOption::corridor`](sharp_guide::GuidedOption::corridor)).
     pub corridor: String,
 }
 
@@ -89,7 +100,7 @@ struct OptionFile {
     corridor: String,
     guide: GuidePath,
     policy: PolicyFile,
-    verified: Tally,
+    verified: SuccessCount,
     mean_time_s: f64,
     env_steps: u64,
     gradient_steps: u64,
@@ -214,8 +225,8 @@ impl OptionLibrary {
                 corridor: option.corridor.clone(),
                 guide: option.guide.clone(),
                 policy: PolicyFile::save(&option.learnt.policy, folder)?,
-                verified: option.learnt.verified,
-                mean_time_s: option.learnt.mean_time_s,
+                verified: option.learnt.estimate.count,
+                mean_time_s: option.learnt.estimate.mean_time_s,
                 env_steps: option.learnt.env_steps,
                 gradient_steps: option.learnt.gradient_steps,
             };
@@ -247,10 +258,9 @@ fn option_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
 }
 
 fn load_option(file: OptionFile, folder: &Path) -> Result<StoredOption, FileError> {
-    let learnt = Learnt {
+    let learnt = LearntPolicy {
         policy: file.policy.load(folder)?,
-        verified: file.verified,
-        mean_time_s: file.mean_time_s,
+        estimate: SuccessEstimate { count: file.verified, mean_time_s: file.mean_time_s },
         env_steps: file.env_steps,
         gradient_steps: file.gradient_steps,
     };
@@ -289,14 +299,15 @@ mod tests {
     use sharp_space::Seed;
 
     use super::*;
-    use crate::drawn::straight;
+    use crate::test_worlds::straight;
 
     const TO_ONE: OptionId = OptionId::Centroid { from: StateId(0), to: StateId(1) };
     const TO_TWO: OptionId = OptionId::Centroid { from: StateId(1), to: StateId(2) };
 
     fn stored(policy: OptionPolicy) -> StoredOption {
-        let verified = Tally { episodes: 1000, successes: 990 };
-        let learnt = Learnt { policy, verified, mean_time_s: 4.5, env_steps: 600, gradient_steps: 300 };
+        let count = SuccessCount { episodes: 1000, successes: 990 };
+        let estimate = SuccessEstimate { count, mean_time_s: 4.5 };
+        let learnt = LearntPolicy { policy, estimate, env_steps: 600, gradient_steps: 300 };
         StoredOption { guide: straight((0.0, 0.0), (2.0, 0.0)), learnt, corridor: "c".repeat(8) }
     }
 
@@ -305,10 +316,10 @@ mod tests {
     }
 
     fn network() -> OptionPolicy {
-        let form = Form::Absolute { reach_m: 0.5 };
-        let spec = EnvironmentSpec { observation_len: form.observation_len(), action_len: 2 };
+        let interface = PolicyInterface::Absolute { reach_m: 0.5 };
+        let spec = EnvironmentSpec { observation_len: interface.observation_len(), action_len: 2 };
         let actor = Actor::new(spec, &[8, 8], &mut Seed(1).stream("actor", 0));
-        OptionPolicy::Learnt { form, actor: Box::new(actor) }
+        OptionPolicy::Network(NetworkPolicy::new(interface, Arc::new(actor)))
     }
 
     /// A library of a follower and a network on disk.
@@ -333,12 +344,12 @@ mod tests {
         for (id, option) in library.iter() {
             let read = opened.get(id).unwrap();
             assert_eq!(read.guide, option.guide, "{id}");
-            let numbers = |learnt: &Learnt| (learnt.verified, learnt.mean_time_s, learnt.env_steps);
+            let numbers = |learnt: &LearntPolicy| (learnt.estimate, learnt.env_steps);
             assert_eq!(numbers(&read.learnt), numbers(&option.learnt), "{id}");
             match (&read.learnt.policy, &option.learnt.policy) {
                 (OptionPolicy::Follower(read), OptionPolicy::Follower(written)) => assert_eq!(read, written),
-                (OptionPolicy::Learnt { actor: read, .. }, OptionPolicy::Learnt { actor: written, .. }) => {
-                    assert_eq!(read, written);
+                (OptionPolicy::Network(read), OptionPolicy::Network(written)) => {
+                    assert_eq!(read.actor, written.actor);
                 }
                 (read, written) => panic!("{id}: {written:?} became {read:?}"),
             }

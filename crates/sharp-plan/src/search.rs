@@ -1,304 +1,386 @@
-//! A* over options (Algorithm 1, line 9).
+//! Search and guides together: an option gets its guide only when a plan wants it (lines 8, 9 and 15).
 //!
-//! The nodes are legs, so that the join of two legs can carry a cost: a guide that ends facing east
-//! cannot always be followed by one that begins to the south. Costs are seconds throughout. A leg
-//! costs its measured time where it was learnt, its guide's length at nominal speed where it was
-//! guided, and the straight distance at nominal speed before that; the heuristic is the straight
-//! distance at top speed, which never overestimates.
+//! Costs begin as lower bounds. Whenever A* returns a plan, its options without a guide are guided and their costs
+//! become exact, or infinite where no guide exists. Then A* runs again, until a plan consists of guided options
+//! only. That plan is as cheap as if every option had been guided beforehand (lazy shortest-path search), and an
+//! option that cannot be guided has lost its edge: the repair that downward refinability needs.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use petgraph::algo::astar;
-use petgraph::graph::{DiGraph, NodeIndex};
-use sharp_options::{Endpoint, EndpointId, EndpointSite, OptionId, OptionKind, OptionSet, OptionSpec};
-use sharp_rbvd::{Rbvd, StateId};
-use sharp_space::{Point, Pose};
+use rayon::prelude::*;
+use sharp_drive::World;
+use sharp_guide::{Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace};
+use sharp_options::OptionId;
+use sharp_rbvd::{StateAbstraction, StateId};
+use sharp_space::{Cell, Point, Seed};
 
-use crate::leg::LegId;
+use crate::abstraction::Abstraction;
+use crate::method::{Method, SearchSettings};
+use crate::option_graph::{Candidate, OptionGraph};
+use crate::query::{Monitor, Phase, Query};
 
-/// A leg that the search may choose, before it has a guide.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
-    /// Its name.
-    pub id: LegId,
-    /// The state it leaves.
-    pub from: StateId,
-    /// The state it ends in.
-    pub to: StateId,
-    /// True for a leg past a centroid: of the state that it begins, ends or, an option, is on the way in.
-    pub is_shortcut: bool,
-    /// Centre of the initiation set.
-    pub start: Point,
-    /// Centre of the termination set.
-    pub end: Point,
-    /// The endpoint it ends at; `None` at the goal configuration.
-    pub endpoint: Option<EndpointId>,
+/// What a hand-over costs that the robot should not be able to make, where no plan does without one, seconds.
+const HARD_HAND_OVER_S: f64 = 120.0;
+/// A car turns no further than this without a loop, whatever the clearance: 120 degrees.
+const CAR_TURN_MAX_RAD: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
+/// A start or goal without a state of its own belongs to the nearest one within this distance, metres: a robot may
+/// stand where the diagram's margin has no state.
+const STATE_NEAR_M: f64 = 0.5;
+
+/// The guided options of one problem and the searches among them.
+#[derive(Debug)]
+pub struct Search<'a> {
+    world: &'a World,
+    guides: &'a dyn GuidePlanner,
+    settings: SearchSettings,
+    space: OptionSpace,
+    query: Query,
+    graph: OptionGraph,
+    guided: BTreeMap<LegId, Result<Arc<GuidedOption>, NoGuide>>,
+    /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
+    charges: BTreeMap<(LegId, LegId), f64>,
+    seed: Seed,
 }
 
-/// All legs of one problem and which may follow which.
-#[derive(Clone, Debug)]
-pub struct OptionGraph {
-    graph: DiGraph<Option<Candidate>, ()>,
-    nodes: BTreeMap<LegId, NodeIndex>,
-    root: NodeIndex,
-    goal: Point,
+/// Why there is no search for a query: no abstract state at one of its ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Unplaced {
+    /// No state near the start.
+    #[error("the start lies in no abstract state: the robot cannot leave it")]
+    Start,
+    /// No state near the goal.
+    #[error("the goal lies in no abstract state: the robot cannot reach it")]
+    Goal,
 }
 
-impl OptionGraph {
-    /// The graph for a problem from `start` to `goal`, whose states are `s_i` and `s_g`.
-    #[must_use]
-    pub fn new(rbvd: &Rbvd, options: &OptionSet, start: (Pose, StateId), goal: (Pose, StateId)) -> Self {
-        let mut graph = DiGraph::new();
-        let root = graph.add_node(None);
-        let mut this = Self { graph, nodes: BTreeMap::new(), root, goal: goal.0.position };
-        let mut entering: BTreeMap<(EndpointId, StateId), Vec<NodeIndex>> = BTreeMap::new();
-        for candidate in first_legs(rbvd, options, start, goal) {
-            let (endpoint, to) = (candidate.endpoint, candidate.to);
-            let node = this.add(candidate);
-            this.graph.add_edge(root, node, ());
-            if let Some(endpoint) = endpoint {
-                entering.entry((endpoint, to)).or_default().push(node);
-            }
-        }
-        let all = || options.options().iter().chain(options.bypasses());
-        for spec in all() {
-            let node = this.add(option_candidate(options, spec));
-            entering.entry((spec.termination, spec.enters())).or_default().push(node);
-        }
-        for candidate in last_legs(rbvd, options, goal) {
-            let (endpoint, from) = (candidate.endpoint, candidate.from);
-            let node = this.add(Candidate { endpoint: None, ..candidate });
-            for &before in endpoint.iter().flat_map(|&e| entering.get(&(e, from)).into_iter().flatten()) {
-                this.graph.add_edge(before, node, ());
-            }
-        }
-        for spec in all() {
-            let node = this.nodes[&LegId::Option(spec.id)];
-            for &before in entering.get(&(spec.initiation, spec.leaves())).into_iter().flatten() {
-                if !goes_back(this.graph[before].as_ref(), spec) {
-                    this.graph.add_edge(before, node, ());
-                }
-            }
-        }
-        this
-    }
-
-    fn add(&mut self, candidate: Candidate) -> NodeIndex {
-        let id = candidate.id;
-        let node = self.graph.add_node(Some(candidate));
-        self.nodes.insert(id, node);
-        node
-    }
-
-    /// The leg called `id`.
-    #[must_use]
-    pub fn candidate(&self, id: LegId) -> Option<&Candidate> {
-        self.nodes.get(&id).and_then(|&node| self.graph[node].as_ref())
-    }
-
-    /// The cheapest sequence of legs from start to goal, or `None` if every one has an infinite cost.
+impl<'a> Search<'a> {
+    /// A search for `query`, as `method` says; `known` are guides from earlier problems.
     ///
-    /// `cost(leg)` and `join(before, after)` are seconds, not negative, infinite where impossible;
-    /// `cost` may not fall below the straight distance divided by `speed_max_mps`.
-    pub fn search(
-        &self,
-        speed_max_mps: f64,
-        cost: impl Fn(&Candidate) -> f64,
-        join: impl Fn(&Candidate, &Candidate) -> f64,
-    ) -> Option<(f64, Vec<LegId>)> {
-        let is_goal = |node: NodeIndex| self.graph[node].as_ref().is_some_and(|leg| leg.endpoint.is_none());
-        let edge_cost = |before: NodeIndex, after: NodeIndex| {
-            let after = self.graph[after].as_ref().map_or(0.0, |leg| {
-                cost(leg) + self.graph[before].as_ref().map_or(0.0, |before| join(before, leg))
-            });
-            debug_assert!(after >= 0.0, "costs are not negative");
-            after
+    /// # Errors
+    /// Names the end of the query that lies in no abstract state (Algorithm 1, line 8).
+    pub fn new(
+        world: &'a World,
+        abstraction: &Abstraction,
+        method: &'a Method,
+        query: Query,
+        known: impl IntoIterator<Item = (LegId, GuidePath)>,
+        seed: Seed,
+    ) -> Result<Self, Unplaced> {
+        let Abstraction { states, options } = abstraction;
+        let start = state_near(&**states, query.start.position).ok_or(Unplaced::Start)?;
+        let goal = state_near(&**states, query.goal.position).ok_or(Unplaced::Goal)?;
+        let graph = OptionGraph::new(&**states, options, (query.start, start), (query.goal, goal));
+        let mut this = Self {
+            world,
+            guides: &*method.guides,
+            settings: method.search,
+            space: abstraction.space(method.search.allowed),
+            query,
+            graph,
+            guided: BTreeMap::new(),
+            charges: BTreeMap::new(),
+            seed,
         };
-        let heuristic = |node: NodeIndex| {
-            self.graph[node].as_ref().map_or(0.0, |leg| (leg.end - self.goal).norm() / speed_max_mps)
-        };
-        use petgraph::visit::EdgeRef;
-        let found = astar(&self.graph, self.root, is_goal, |e| edge_cost(e.source(), e.target()), heuristic);
-        let (seconds, nodes) = found.filter(|(seconds, _)| seconds.is_finite())?;
-        Some((
-            seconds,
-            nodes.iter().filter_map(|&node| self.graph[node].as_ref().map(|leg| leg.id)).collect(),
-        ))
-    }
-}
-
-/// A centroid option back to where the one before came from never helps.
-fn goes_back(before: Option<&Candidate>, spec: &OptionSpec) -> bool {
-    let came_from = before.filter(|before| matches!(before.id, LegId::Option(_))).map(|before| before.from);
-    spec.id.kind() == OptionKind::Centroid && came_from == Some(spec.id.to())
-}
-
-fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
-    Candidate {
-        id: LegId::Option(spec.id),
-        from: spec.id.from(),
-        to: spec.id.to(),
-        is_shortcut: matches!(spec.id, OptionId::Bypass { .. }),
-        start: options.endpoint(spec.initiation).center,
-        end: options.endpoint(spec.termination).center,
-        endpoint: Some(spec.termination),
-    }
-}
-
-/// `π_0`: from the start to each endpoint of its own state, and to the centroids next door, so that
-/// nobody has to drive back to a centroid first; straight to the goal if it lies in the same state.
-fn first_legs(
-    rbvd: &Rbvd,
-    options: &OptionSet,
-    start: (Pose, StateId),
-    goal: (Pose, StateId),
-) -> Vec<Candidate> {
-    let mut legs = Vec::new();
-    if start.1 == goal.1 {
-        legs.push(Candidate {
-            id: LegId::Direct,
-            from: start.1,
-            to: goal.1,
-            is_shortcut: false,
-            start: start.0.position,
-            end: goal.0.position,
-            endpoint: None,
-        });
-    }
-    for endpoint_id in endpoints_near(rbvd, options, start.1) {
-        let endpoint = options.endpoint(endpoint_id);
-        let to = other_state(&endpoint.states, start.1);
-        legs.push(Candidate {
-            id: LegId::First(endpoint_id.0),
-            from: start.1,
-            to,
-            is_shortcut: is_centroid_elsewhere(endpoint, start.1),
-            start: start.0.position,
-            end: endpoint.center,
-            endpoint: Some(endpoint_id),
-        });
-    }
-    legs
-}
-
-/// `π_{n+1}`: from each endpoint of the goal's state, and from the centroids next door, to the goal.
-fn last_legs(rbvd: &Rbvd, options: &OptionSet, goal: (Pose, StateId)) -> Vec<Candidate> {
-    endpoints_near(rbvd, options, goal.1)
-        .into_iter()
-        .map(|endpoint_id| {
-            let endpoint = options.endpoint(endpoint_id);
-            // Entered from the other side of an interface, the robot is about to be in the goal's state.
-            let from = if endpoint.states.len() > 1 { goal.1 } else { endpoint.states[0] };
-            Candidate {
-                id: LegId::Last(endpoint_id.0, from),
-                from,
-                to: goal.1,
-                is_shortcut: is_centroid_elsewhere(endpoint, goal.1),
-                start: endpoint.center,
-                end: goal.0.position,
-                endpoint: Some(endpoint_id),
+        for (id, guide) in known {
+            if let Some(candidate) = this.graph.candidate(id) {
+                let option = this.guided(candidate, guide);
+                this.guided.insert(id, Ok(Arc::new(option)));
             }
-        })
-        .collect()
+        }
+        Ok(this)
+    }
+
+    /// Makes all plans in which `after` follows `before` cost `seconds` more: a hand-over that was seen to fail.
+    pub fn charge(&mut self, before: LegId, after: LegId, seconds: f64) {
+        self.charges.insert((before, after), seconds);
+    }
+
+    /// The cheapest plan of guided options, or `None`. `measured` knows what learnt options cost, seconds.
+    pub fn plan(
+        &mut self,
+        measured: &dyn Fn(LegId) -> Option<f64>,
+        monitor: &dyn Monitor,
+    ) -> Option<Vec<Arc<GuidedOption>>> {
+        loop {
+            monitor.phase(Phase::Search);
+            let ids = self.cheapest(measured)?;
+            let missing: Vec<LegId> =
+                ids.iter().copied().filter(|id| !self.guided.contains_key(id)).collect();
+            if missing.is_empty() {
+                return ids.iter().map(|id| self.guided[id].clone().ok()).collect();
+            }
+            monitor.phase(Phase::Guide);
+            let guided: Vec<_> = missing.par_iter().map(|&id| (id, self.guide(id))).collect();
+            self.guided.extend(guided);
+        }
+    }
+
+    /// The names of the cheapest plan by what is known now.
+    fn cheapest(&self, measured: &dyn Fn(LegId) -> Option<f64>) -> Option<Vec<LegId>> {
+        let top_speed = self.world.robot.max_speed_mps;
+        let cost = |option: &Candidate| self.cost_s(option, measured(option.id()));
+        let charge = |before: &Candidate, after: &Candidate| {
+            self.charges.get(&(before.id(), after.id())).copied().unwrap_or(0.0)
+        };
+        let strict =
+            |before: &Candidate, after: &Candidate| self.hand_over_s(before, after) + charge(before, after);
+        // A hand-over that may fail is better than no plan: what it is worth will be measured.
+        let lenient = |before: &Candidate, after: &Candidate| {
+            self.hand_over_s(before, after).min(HARD_HAND_OVER_S) + charge(before, after)
+        };
+        let found = self.graph.search(top_speed, cost, strict);
+        found.or_else(|| self.graph.search(top_speed, cost, lenient)).map(|(_, ids)| ids)
+    }
+
+    /// The option called `id` with a guide of its own, if it was guided.
+    pub(crate) fn option(&self, id: LegId) -> Option<&GuidedOption> {
+        self.guided.get(&id).and_then(|option| option.as_deref().ok())
+    }
+
+    /// The options that could not be guided, with the reason.
+    pub fn unguided(&self) -> impl Iterator<Item = (LegId, &NoGuide)> {
+        self.guided.iter().filter_map(|(&id, option)| option.as_ref().err().map(|reason| (id, reason)))
+    }
+
+    /// What `option` costs, seconds: what was measured, else the length of its guide at nominal speed, else its
+    /// straight length; infinite where it has no guide.
+    fn cost_s(&self, option: &Candidate, measured: Option<f64>) -> f64 {
+        let settings = &self.settings;
+        if !settings.bypasses && matches!(option.id(), LegId::Option(OptionId::Bypass { .. })) {
+            return f64::INFINITY;
+        }
+        let straight_m = option.straight_m();
+        let length_m = match self.guided.get(&option.id()) {
+            Some(Ok(guided)) => guided.guide.length_m().max(straight_m),
+            Some(Err(_)) => return f64::INFINITY,
+            None => straight_m,
+        };
+        let top_mps = self.world.robot.max_speed_mps;
+        let least_s = straight_m / top_mps;
+        let estimated = length_m / (settings.nominal_speed * top_mps) + settings.untrained_surcharge_s;
+        let bypass_s = if option.is_bypass { settings.bypass_surcharge_s } else { 0.0 };
+        let measured = measured.filter(|_| settings.cost_update);
+        measured.map_or(estimated, |seconds| seconds.max(least_s)) + bypass_s
+    }
+
+    /// Seconds lost where one guide ends and the next begins; infinite where the robot should not turn so.
+    fn hand_over_s(&self, before: &Candidate, after: &Candidate) -> f64 {
+        let (Some(first), Some(second)) = (self.option(before.id()), self.option(after.id())) else {
+            return 0.0;
+        };
+        let turn = first.guide.end().heading.turn_to(second.guide.start().heading).abs();
+        let robot = &self.world.robot;
+        let turn_s = turn / (robot.max_yaw_rate_radps * robot.yaw_gain());
+        let clearance_m = self.world.geometry.clearance().sample(after.option.start);
+        if turn <= self.smooth_turn_rad(clearance_m) {
+            return turn_s;
+        }
+        // Room for the whole circle, or for a car's loop, and for arriving off the centre.
+        let radius_m = robot.min_turning_radius_m();
+        let circle_m = 2.0 * radius_m + robot.footprint.circumscribed_radius_m() + 0.3;
+        let nominal_mps = self.settings.nominal_speed * robot.max_speed_mps;
+        let loop_s = 2.0 + std::f64::consts::TAU * radius_m / nominal_mps;
+        if clearance_m > circle_m { turn_s + loop_s } else { f64::INFINITY }
+    }
+
+    /// The largest turn between two guides that the robot makes without stopping, with `clearance_m` around it.
+    ///
+    /// A car rounds the corner of two lines on a circle that touches them radius x tan(turn / 2)
+    /// before and behind it. The outline of a robot that turns in place swings out instead.
+    fn smooth_turn_rad(&self, clearance_m: f64) -> f64 {
+        let robot = &self.world.robot;
+        if robot.can_turn_in_place() {
+            return self.settings.smooth_turn_rad;
+        }
+        let run_up_m = (clearance_m - robot.footprint.inscribed_radius_m()).max(0.0);
+        (2.0 * (run_up_m / robot.min_turning_radius_m()).atan()).min(CAR_TURN_MAX_RAD)
+    }
+
+    fn guide(&self, id: LegId) -> Result<Arc<GuidedOption>, NoGuide> {
+        let candidate = self.graph.candidate(id).expect("the search returns its own options");
+        let mut rng = self.seed.stream(&format!("guide {id}"), 0);
+        let robot = self.world.guide_robot();
+        let guide = candidate.option.plan_guide(&self.space, &robot, self.guides, &mut rng)?;
+        Ok(Arc::new(self.guided(candidate, guide)))
+    }
+
+    fn guided(&self, candidate: &Candidate, guide: GuidePath) -> GuidedOption {
+        let goal = Goal { point: self.query.goal.position, radius_m: self.world.robot.goal_tolerance_m };
+        let option = &candidate.option;
+        GuidedOption::new(&self.space, option.id, (option.from, option.to), guide, goal)
+    }
 }
 
-/// The endpoints of `state` itself, and the centroids of its neighbours.
-fn endpoints_near(rbvd: &Rbvd, options: &OptionSet, state: StateId) -> Vec<EndpointId> {
-    let is_near = |endpoint: &Endpoint| match endpoint.site {
-        EndpointSite::Centroid(other) => other == state || rbvd.neighbors(state).contains(&other),
-        EndpointSite::Interface(_) | EndpointSite::Custom(_) => endpoint.states.contains(&state),
-    };
-    let numbered = options.endpoints().iter().zip(0..);
-    numbered.filter(|(endpoint, _)| is_near(endpoint)).map(|(_, index)| EndpointId(index)).collect()
-}
-
-fn is_centroid_elsewhere(endpoint: &Endpoint, state: StateId) -> bool {
-    matches!(endpoint.site, EndpointSite::Centroid(other) if other != state)
-}
-
-/// The state on the far side of an interface, or the centroid's own.
-fn other_state(states: &[StateId], near: StateId) -> StateId {
-    states.iter().copied().find(|&state| state != near).unwrap_or(near)
+/// α(x), or the state of the nearest cell that has one nearby.
+fn state_near(states: &dyn StateAbstraction, point: Point) -> Option<StateId> {
+    if let Some(state) = states.state_at(point) {
+        return Some(state);
+    }
+    let frame = states.frame();
+    let center = frame.cell_at(point)?;
+    let reach = (STATE_NEAR_M / frame.resolution_m).ceil() as usize;
+    let rows = center.row.saturating_sub(reach)..=(center.row + reach).min(frame.height - 1);
+    rows.flat_map(|row| {
+        let cols = center.col.saturating_sub(reach)..=(center.col + reach).min(frame.width - 1);
+        cols.map(move |col| Cell::new(col, row))
+    })
+    .filter_map(|cell| states.state_of(cell).map(|state| ((frame.center(cell) - point).norm(), cell, state)))
+    .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+    .map(|(_, _, state)| state)
 }
 
 #[cfg(test)]
 mod tests {
+    use sharp_options::OptionKind;
+    use sharp_space::Pose;
+
     use super::*;
-    use crate::drawn::{HALL, RING, SEALED, along, world};
-    use crate::planner::Query;
+    use crate::test_worlds::{HALL, RING, SEALED, along, straight, world};
 
-    fn graph(drawing: &str, kind: OptionKind, query: Query) -> OptionGraph {
-        let (_, abstraction) = world(drawing, kind);
-        let place = |pose: Pose| (pose, abstraction.rbvd.state_at(pose.position).expect("a state"));
-        OptionGraph::new(&abstraction.rbvd, &abstraction.options, place(query.start), place(query.goal))
+    fn names(options: &[Arc<GuidedOption>]) -> String {
+        options.iter().map(|option| option.id.to_string()).collect::<Vec<_>>().join(" ")
     }
 
-    fn straight_m(leg: &Candidate) -> f64 {
-        (leg.end - leg.start).norm()
+    /// The cheapest plan for `query` as `settings` say, where `measured` knows what options cost.
+    fn plan(
+        (world, abstraction): &(World, Abstraction),
+        query: Query,
+        settings: SearchSettings,
+        measured: &dyn Fn(LegId) -> Option<f64>,
+    ) -> Option<Vec<Arc<GuidedOption>>> {
+        let method = Method { search: settings, ..Method::fast() };
+        let search = Search::new(world, abstraction, &method, query, [], Seed(1));
+        search.expect("both ends have a state").plan(measured, &())
     }
 
-    fn names(legs: &[LegId]) -> String {
-        legs.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+    fn unmeasured(_: LegId) -> Option<f64> {
+        None
     }
 
-    /// The names of the shortest plan; first and last legs past a centroid cost 10 m more.
-    fn shortest(drawing: &str, kind: OptionKind, query: Query) -> Option<String> {
-        let cost = |leg: &Candidate| straight_m(leg) + if leg.is_shortcut { 10.0 } else { 0.0 };
-        graph(drawing, kind, query).search(1.0, cost, |_, _| 0.0).map(|(_, legs)| names(&legs))
-    }
-
-    #[test]
-    fn a_hall_is_crossed_from_region_to_region() {
-        let centroid = shortest(HALL, OptionKind::Centroid, along());
-        assert_eq!(centroid.as_deref(), Some("first:0 c:0-1 c:1-2 last:2"));
-        let interface = shortest(HALL, OptionKind::Interface, along());
-        assert_eq!(interface.as_deref(), Some("first:0 i:0-1-2 last:1"));
+    /// Round the block of the [`RING`].
+    fn round() -> Query {
+        Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) }
     }
 
     #[test]
-    fn within_a_state_one_leg_is_enough() {
-        let nearby = Query { start: Pose::new(1.0, 2.0, 0.0), goal: Pose::new(2.5, 2.2, 0.0) };
-        for kind in [OptionKind::Centroid, OptionKind::Interface] {
-            assert_eq!(shortest(HALL, kind, nearby).as_deref(), Some("first:goal"), "{kind:?}");
+    fn a_hand_over_that_was_seen_to_fail_sends_the_plan_the_other_way_round() {
+        let (world, abstraction) = world(RING, OptionKind::Interface);
+        let method = Method::fast();
+        let search = Search::new(&world, &abstraction, &method, round(), [], Seed(1));
+        let mut search = search.expect("both ends have a state");
+        let first = search.plan(&unmeasured, &()).expect("two ways lead round");
+        let ids = |options: &[Arc<GuidedOption>]| options.iter().map(|o| o.id).collect::<Vec<_>>();
+        for pair in ids(&first).windows(2) {
+            search.charge(pair[0], pair[1], 1000.0);
+        }
+        let second = search.plan(&unmeasured, &()).expect("the other way");
+        let before = ids(&first);
+        let kept = ids(&second).windows(2).any(|pair| before.windows(2).any(|joined| joined == pair));
+        assert!(!kept, "{} keeps a hand-over of {}", names(&second), names(&first));
+    }
+
+    #[test]
+    fn measured_costs_make_a_plan_change_its_way() {
+        let world = world(RING, OptionKind::Interface);
+        let settings = SearchSettings::default();
+        let first = plan(&world, round(), settings, &unmeasured).expect("two ways lead round");
+        let option = first.iter().find(|o| matches!(o.id, LegId::Option(_))).expect("an option").id;
+        let slow = |id| (id == option).then_some(500.0);
+        let second = plan(&world, round(), settings, &slow).expect("the other way");
+        assert!(second.iter().all(|o| o.id != option), "{} uses the slow {option}", names(&second));
+        let settings = SearchSettings { cost_update: false, ..settings };
+        let third = plan(&world, round(), settings, &slow).expect("the first way");
+        assert_eq!(names(&third), names(&first), "without the update nothing flows back");
+    }
+
+    /// A corridor of 1.6 m with a corner, and regions on both sides of it.
+    const CORNER: &str = "
+        ###############
+        #.............#
+        #.............#
+        #..0..1.......#
+        #.............#
+        #########.....#
+        #########.....#
+        #########.....#
+        #########..2..#
+        #########.....#
+        #########.....#
+        ###############";
+
+    #[test]
+    fn a_turn_that_is_too_sharp_is_better_than_no_plan() {
+        let world = world(CORNER, OptionKind::Centroid);
+        let query = Query { start: Pose::new(1.2, 3.2, 0.0), goal: Pose::new(4.6, 1.2, 0.0) };
+        for smooth_turn_rad in [75.0_f64.to_radians(), 0.01] {
+            let settings = SearchSettings { smooth_turn_rad, ..SearchSettings::default() };
+            assert!(
+                plan(&world, query, settings, &unmeasured).is_some(),
+                "no plan where turns of {smooth_turn_rad} rad are smooth"
+            );
         }
     }
 
-    #[test]
-    fn sealed_rooms_have_no_plan() {
-        let through = Query { start: Pose::new(2.0, 1.4, 0.0), goal: Pose::new(6.0, 1.4, 0.0) };
-        for kind in [OptionKind::Centroid, OptionKind::Interface] {
-            assert_eq!(shortest(SEALED, kind, through), None, "{kind:?}");
-        }
-    }
+    /// A corridor of 2 m with a dead end off it, in which the region of the middle state lies.
+    const ALCOVE: &str = "
+        ###########################
+        ###########.....###########
+        ###########.....###########
+        ###########..1..###########
+        ###########.....###########
+        ###########.....###########
+        #.........................#
+        #.........................#
+        #...0.................2...#
+        #.........................#
+        #.........................#
+        ###########################";
 
     #[test]
-    fn an_impossible_leg_or_join_sends_the_plan_the_other_way_round() {
-        let across = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
-        let graph = graph(RING, OptionKind::Centroid, across);
-        let (length_m, legs) = graph.search(1.0, straight_m, |_, _| 0.0).expect("a ring has two ways");
-        let banned = |leg: &Candidate| if legs.contains(&leg.id) { f64::INFINITY } else { straight_m(leg) };
-        let (detour_m, others) = graph.search(1.0, banned, |_, _| 0.0).expect("the other way");
-        assert!(detour_m > length_m, "{detour_m} m is no detour from {length_m} m");
-        assert!(legs.iter().all(|leg| !others.contains(leg)), "{} keeps a banned leg", names(&others));
-        let broken = |before: &Candidate, after: &Candidate| {
-            let joins = legs.windows(2).any(|pair| pair == [before.id, after.id]);
-            if joins { f64::INFINITY } else { 0.0 }
+    fn a_centroid_from_which_nobody_gets_on_is_passed_by() {
+        let world = world(ALCOVE, OptionKind::Centroid);
+        let query = Query { start: Pose::new(1.0, 1.4, 0.0), goal: Pose::new(9.8, 1.4, 0.0) };
+        let names = |bypasses| {
+            let settings = SearchSettings { bypasses, ..SearchSettings::default() };
+            super::tests::names(&plan(&world, query, settings, &unmeasured).expect("a way"))
         };
-        let (_, rejoined) = graph.search(1.0, straight_m, broken).expect("the other way");
-        assert!(rejoined != legs, "{} keeps a join that is impossible", names(&rejoined));
-        assert!(graph.search(1.0, |_| f64::INFINITY, |_, _| 0.0).is_none(), "no leg is possible");
+        assert_eq!(names(true), "first:0 c:0-1-2 last:2");
+        assert_eq!(
+            names(false),
+            "first:0 c:0-1 c:1-2 last:2",
+            "the paper's options turn round in the dead end"
+        );
     }
 
     #[test]
-    fn the_cheapest_plan_agrees_with_an_uninformed_search() {
-        let across = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+    fn guides_from_earlier_problems_are_kept() {
+        let (world, abstraction) = world(HALL, OptionKind::Centroid);
+        let spec = abstraction.options.options()[0];
+        let ends = |id| abstraction.options.endpoint(id).center;
+        let (from, to) = (ends(spec.initiation), ends(spec.termination));
+        let known = straight((from.x, from.y), (to.x, to.y));
+        let guides = [(LegId::Option(spec.id), known.clone())];
+        let method = Method::fast();
+        let search = Search::new(&world, &abstraction, &method, along(), guides, Seed(1));
+        let options = search.expect("both ends have a state").plan(&unmeasured, &()).expect("a way");
+        let option = options.iter().find(|option| option.id == LegId::Option(spec.id)).expect("on the way");
+        assert_eq!(option.guide, known, "planned again");
+    }
+
+    #[test]
+    fn sealed_rooms_have_no_plan_and_walls_have_no_state() {
         for kind in [OptionKind::Centroid, OptionKind::Interface] {
-            let graph = graph(RING, kind, across);
-            let turn = |before: &Candidate, after: &Candidate| f64::from((before.to.0 + after.to.0) % 3);
-            let informed = graph.search(1.0, straight_m, turn).map(|found| found.0);
-            // At an endless top speed the heuristic knows nothing.
-            let blind = graph.search(f64::INFINITY, straight_m, turn).map(|found| found.0);
-            assert_eq!(informed, blind, "{kind:?}: the heuristic overestimates");
+            let world = world(SEALED, kind);
+            let through = Query { start: Pose::new(2.0, 1.4, 0.0), goal: Pose::new(6.0, 1.4, 0.0) };
+            let none = plan(&world, through, SearchSettings::default(), &unmeasured);
+            assert!(none.is_none(), "{kind:?}: through a wall");
+            let outside = Pose::new(-5.0, 1.0, 0.0);
+            let method = Method::fast();
+            let placed = |query| Search::new(&world.0, &world.1, &method, query, [], Seed(1)).map(|_| ());
+            assert_eq!(placed(Query { start: outside, ..through }), Err(Unplaced::Start), "{kind:?}");
+            assert_eq!(placed(Query { goal: outside, ..through }), Err(Unplaced::Goal), "{kind:?}");
         }
     }
 }

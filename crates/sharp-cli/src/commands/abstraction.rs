@@ -1,7 +1,8 @@
 //! `sharp abstract`: the abstraction of a map, as files, pictures and a route graph.
 
+use sharp_drive::World;
 use sharp_options::{OptionKind, OptionSet};
-use sharp_plan::{Workspace, write_atomic};
+use sharp_plan::write_atomic;
 
 use crate::args::Abstract;
 use crate::outcome::{Exit, Failure, say, to_json};
@@ -13,8 +14,8 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
     let mut stopwatch = Stopwatch::start();
     stopwatch.enter("load");
     let map = input::map(&args.map)?;
-    let workspace = Workspace::new(map.grid.clone(), input::robot(&args.abstraction.robot)?);
-    let built = pipeline::abstraction(&workspace, &args.abstraction, None, &mut stopwatch)?;
+    let world = World::new(map.grid.clone(), input::robot(&args.abstraction.robot)?);
+    let built = pipeline::abstraction(&world, &args.abstraction, None, &mut stopwatch)?;
     let abstraction = built.file.abstraction();
     let count = |kind| OptionSet::synthesize(&built.file.rbvd, kind, &built.file.options).options().len();
 
@@ -27,14 +28,14 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
         )?;
     }
     pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
-    let route = geojson::route(&abstraction, workspace.robot.max_speed_mps);
+    let route = geojson::route(&abstraction, world.robot.max_speed_mps);
     write_atomic(&args.out.join("route.geojson"), route.as_bytes())?;
 
     let rbvd = &built.file.rbvd;
     let report = AbstractReport {
         schema: "sharp.abstract/1",
         map: MapReport::new(&map.name, &map.grid),
-        robot: workspace.robot.name.clone(),
+        robot: world.robot.name.clone(),
         regions: built.source.clone(),
         states: rbvd.len(),
         neighbors: rbvd.states().map(|state| rbvd.neighbors(state).len()).sum::<usize>() / 2,

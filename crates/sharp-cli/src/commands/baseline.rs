@@ -4,11 +4,12 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use sharp_motion::{Budget, RrtSettings};
-use sharp_plan::{
-    Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, PacedFollower,
-    Query, RoutePlanner, Rrt, Sac, SacBudget, Tally, Track, Workspace, compare,
+use sharp_bench::{
+    ComparisonSettings, Contender as System, Driven, Mpc, RoutePlanner, Rrt, Sac, SacBudget, Track, compare,
 };
+use sharp_drive::{EpisodeEnd, MppiSettings, ProfiledFollower, SuccessCount, Wall, World};
+use sharp_motion::{Budget, RrtSettings};
+use sharp_plan::{Conditions, Query};
 use sharp_rl::Progress;
 use sharp_sim::NoiseModel;
 use sharp_space::Seed;
@@ -67,7 +68,7 @@ pub(crate) struct BaselineReport {
 /// The problem with everything around it.
 struct Bench<'a> {
     args: &'a Baseline,
-    workspace: Workspace,
+    world: World,
     query: Query,
     settings: ComparisonSettings,
     seed: Seed,
@@ -109,17 +110,22 @@ pub(crate) fn measure(args: &Baseline, seed: u64) -> Result<BaselineReport, Fail
     let map = input::map(&args.map)?;
     let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
     let noise = input::noise(&args.noise)?;
-    let workspace = Workspace::new(map.grid.clone(), input::robot(&args.robot)?);
-    input::check_query(&workspace, &query)?;
-    let settings = comparison(args, noise, seed)?;
-    let bench = Bench { args, workspace, query, settings, seed: Seed(seed).child("baseline", 0) };
+    let world = World::new(map.grid.clone(), input::robot(&args.robot)?);
+    input::check_query(&world, &query)?;
+    let settings = comparison(args, &world, noise, seed)?;
+    let bench = Bench { args, world, query, settings, seed: Seed(seed).child("baseline", 0) };
     let stop = || is_interrupted() || deadline.is_some_and(|deadline| Instant::now() >= deadline);
     let measured = bench.measure(&mut stopwatch, &stop)?;
     Ok(bench.report(seed, MapReport::new(&map.name, &map.grid), measured.as_ref(), &stopwatch))
 }
 
-fn comparison(args: &Baseline, noise: NoiseModel, seed: u64) -> Result<ComparisonSettings, Failure> {
-    let simulator = input::simulator(&args.simulator)?;
+fn comparison(
+    args: &Baseline,
+    world: &World,
+    noise: NoiseModel,
+    seed: u64,
+) -> Result<ComparisonSettings, Failure> {
+    let simulator = world.simulator(input::simulator(&args.simulator)?);
     Ok(ComparisonSettings {
         episodes: args.episodes,
         simulator,
@@ -137,31 +143,38 @@ impl Bench<'_> {
         stopwatch: &mut Stopwatch,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<Measured>, Failure> {
-        let Self { args, workspace, query, seed, .. } = self;
+        let Self { args, world, query, seed, .. } = self;
         stopwatch.enter("plan");
-        let planner = RoutePlanner::new(workspace);
+        let planner = RoutePlanner::new(world, query.goal);
         if args.method == Method::Rrt {
             let budget = Budget { iterations: args.rrt_samples };
             let settings = RrtSettings { budget, ..RrtSettings::default() };
-            let rrt = Rrt { workspace, planner: &planner, query: *query, settings, seed: *seed };
+            let rrt = Rrt {
+                world,
+                planner: &planner,
+                query: *query,
+                settings,
+                contact_ends: self.settings.contact_ends,
+                seed: *seed,
+            };
             return Ok(Some(self.drive(&rrt, stopwatch, stop)));
         }
-        let route = planner.plan(query);
+        let route = planner.plan_from(query.start);
         stopwatch.stop();
         if args.method == Method::Sac {
-            let length_s = route.map(|route| 6.0 * route.length_m() / workspace.robot.max_speed_mps);
+            let length_s = route.map(|route| 6.0 * route.length_m() / world.robot.max_speed_mps);
             return self.learn(length_s.unwrap_or(HORIZON_S).max(60.0), stopwatch, stop).map(Some);
         }
         let Some(route) = route else { return Ok(None) };
-        let (robot, noise) = (&workspace.robot, self.settings.noise.clone());
+        let (robot, noise) = (&world.robot, self.settings.noise.clone());
         Ok(Some(if args.method == Method::Track {
             self.drive(
                 &Track {
-                    workspace,
+                    world,
                     planner: &planner,
                     query: *query,
                     route,
-                    settings: PacedFollower::tuned(robot, &noise),
+                    follower: ProfiledFollower::tuned(robot, &noise),
                     noise,
                 },
                 stopwatch,
@@ -170,7 +183,7 @@ impl Bench<'_> {
         } else {
             let settings = MppiSettings::new(robot, &noise);
             self.drive(
-                &Mppi { workspace, planner: &planner, query: *query, route, settings, noise, seed: *seed },
+                &Mpc { world, planner: &planner, query: *query, route, settings, noise, seed: *seed },
                 stopwatch,
                 stop,
             )
@@ -192,8 +205,8 @@ impl Bench<'_> {
             }
             if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let noise = (&self.settings.noise, self.seed);
-        let learnt = Sac::learn(&self.workspace, self.query, noise, budget, &mut observer)
+        let conditions = Conditions::new(&self.world, self.settings.noise.clone());
+        let learnt = Sac::learn(&self.world, self.query, (&conditions, self.seed), budget, &mut observer)
             .map_err(|error| Failure::from(anyhow::Error::from(error)))?;
         // The limit is for learning: what was learnt is driven in any case.
         let driven = self.drive(&learnt, stopwatch, &is_interrupted);
@@ -209,8 +222,8 @@ impl Bench<'_> {
         stopwatch.enter("drive");
         let begun = Instant::now();
         let clock_us = || begun.elapsed().as_secs_f64() * 1e6;
-        let host = Host { clock_us: &clock_us, stop };
-        let driven = compare(system, &self.workspace, &self.query, &self.settings, &host);
+        let wall = Wall { clock_us: &clock_us, should_stop: stop };
+        let driven = compare(system, &self.world, &self.query, &self.settings, &wall);
         stopwatch.stop();
         Measured { driven, ..Measured::default() }
     }
@@ -224,20 +237,21 @@ impl Bench<'_> {
     ) -> BaselineReport {
         let nothing = Measured::default();
         let Measured { driven, env_steps, gradient_steps } = measured.unwrap_or(&nothing);
-        let ended = |end: EpisodeEnd| driven.iter().filter(|one| one.episode.end == end).count() as u32;
-        let tally = Tally { episodes: self.args.episodes, successes: ended(EpisodeEnd::Reached) };
+        let ended = |end: EpisodeEnd| driven.iter().filter(|one| one.end == end).count() as u32;
+        let tally = SuccessCount { episodes: self.args.episodes, successes: ended(EpisodeEnd::Reached) };
         let mean = |of: fn(&Driven) -> f64| {
-            let reached = driven.iter().filter(|one| one.episode.end == EpisodeEnd::Reached);
+            let reached = driven.iter().filter(|one| one.end == EpisodeEnd::Reached);
             reached.map(of).fold(0.0, |sum, value| sum + value) / f64::from(tally.successes.max(1))
         };
-        let planning_us = driven.iter().map(|one| one.plan_us).sum::<f64>() / driven.len().max(1) as f64;
+        let planning_us =
+            driven.iter().map(|one| one.record.planning_us).sum::<f64>() / driven.len().max(1) as f64;
         BaselineReport {
             schema: "sharp.baseline/1",
             method: self.args.method.name(),
             status: if measured.is_some() { "driven" } else { "no_plan" },
-            robot: self.workspace.robot.name.clone(),
+            robot: self.world.robot.name.clone(),
             noise: self.args.noise.clone(),
-            simulator: self.settings.simulator.to_string(),
+            simulator: self.args.simulator.clone(),
             seed,
             map,
             episodes: tally.episodes,
@@ -245,12 +259,12 @@ impl Bench<'_> {
             success_rate: tally.rate(),
             lower95: tally.lower95(),
             upper95: tally.upper95(),
-            collisions: driven.iter().map(|one| one.episode.contacts).sum(),
+            collisions: driven.iter().map(|one| one.record.contacts).sum(),
             timeouts: ended(EpisodeEnd::TimedOut) + ended(EpisodeEnd::Lost),
-            strays: driven.iter().map(|one| one.episode.events.strays).sum(),
-            recoveries: driven.iter().map(|one| one.episode.events.recoveries).sum(),
-            mean_sim_time_s: mean(|one| one.episode.time_s),
-            mean_path_m: mean(|one| one.episode.path_m),
+            strays: 0,
+            recoveries: driven.iter().map(Driven::replans).sum(),
+            mean_sim_time_s: mean(|one| one.record.time_s),
+            mean_path_m: mean(|one| one.record.path_m),
             env_steps: *env_steps,
             gradient_steps: *gradient_steps,
             decision_us: decision_times(driven),
@@ -266,8 +280,7 @@ impl Bench<'_> {
 }
 
 fn decision_times(driven: &[Driven]) -> DecisionTimes {
-    let mut times: Vec<f64> =
-        driven.iter().flat_map(|one| one.episode.decisions_us.iter().copied()).collect();
+    let mut times: Vec<f64> = driven.iter().flat_map(|one| one.record.decisions_us.iter().copied()).collect();
     times.sort_by(f64::total_cmp);
     let quantile = |q: f64| {
         let last = times.len().saturating_sub(1);

@@ -57,9 +57,9 @@ fn entries(dir: &Path) -> Result<Vec<Entry>, Failure> {
         entries.extend(library.iter().map(|(id, stored)| Entry {
             world: world.clone(),
             option: id.to_string(),
-            episodes: stored.learnt.verified.episodes,
-            successes: stored.learnt.verified.successes,
-            cost_s: stored.learnt.cost_s(sharp_plan::FAILURE_COST_S),
+            episodes: stored.learnt.estimate.count.episodes,
+            successes: stored.learnt.estimate.count.successes,
+            cost_s: stored.learnt.cost_s(sharp_drive::FAILURE_COST_S),
         }));
     }
     Ok(entries)

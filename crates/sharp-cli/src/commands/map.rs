@@ -1,7 +1,7 @@
 //! `sharp map info|check`: what a map file says, and whether a robot has room in it.
 
 use serde::Serialize;
-use sharp_plan::Workspace;
+use sharp_drive::World;
 use sharp_rbvd::Rbvd;
 use sharp_space::Occupancy;
 
@@ -78,11 +78,11 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
         }
         Map::Check { map, robot } => {
             let map = input::map(map)?;
-            let workspace = Workspace::new(map.grid, input::robot(robot)?);
-            let rbvd = Rbvd::build(workspace.checker.field(), &[], &pipeline::rbvd_settings(&workspace)).ok();
+            let world = World::new(map.grid, input::robot(robot)?);
+            let rbvd = Rbvd::build(world.geometry.clearance(), &[], &pipeline::rbvd_settings(&world)).ok();
             let check = Check {
                 schema: "sharp.map.check/1",
-                robot: workspace.robot.name.clone(),
+                robot: world.robot.name.clone(),
                 passable: rbvd.as_ref().is_some_and(|rbvd| rbvd.component_count() > 0),
                 components: rbvd.as_ref().map_or(0, Rbvd::component_count),
                 covered: rbvd.as_ref().map_or(0.0, Rbvd::covered_share),

@@ -9,9 +9,11 @@ use std::time::Instant;
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
+use sharp_drive::{Follower, OptionPolicy, OptionTask, Prior, ProfiledFollower, SuccessEstimate, World};
 use sharp_options::{OptionKind, OptionSet};
-use sharp_plan::prior::{self, Course, CourseTask};
-use sharp_plan::{Abstraction, Follower, OptionPolicy, PacedFollower, Prior, Query, Workspace, write_atomic};
+use sharp_plan::{
+    Abstraction, Query, RouteScenarios, TrainingRoute, prior_train_settings, training_routes, write_atomic,
+};
 use sharp_rl::{Progress, TrainSettings, TrainState, Trained, fine_tune, resume, train};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::floorplan::{FloorplanKind, generate};
@@ -134,15 +136,19 @@ fn checkpoint(args: &PriorTrain) -> PathBuf {
 }
 
 /// Trains on `courses`, from a checkpoint where one was left; `None` if it was interrupted.
-fn learn(args: &PriorTrain, courses: &Arc<Vec<Course>>, seed: u64) -> Result<Option<Trained>, Failure> {
-    let max_env_steps = args.steps.unwrap_or(prior::train_settings().max_env_steps);
-    let settings = TrainSettings { max_env_steps, ..prior::train_settings() };
+fn learn(
+    args: &PriorTrain,
+    courses: &Arc<Vec<TrainingRoute>>,
+    seed: u64,
+) -> Result<Option<Trained>, Failure> {
+    let max_env_steps = args.steps.unwrap_or(prior_train_settings().max_env_steps);
+    let settings = TrainSettings { max_env_steps, ..prior_train_settings() };
     let noises = Arc::new(vec![NoiseModel::nominal(), NoiseModel::harsh(), NoiseModel::biased()]);
     let task = |index| {
-        let seed = Seed(seed).child("environment", index);
-        CourseTask::new(Arc::clone(courses), Arc::clone(&noises), seed)
+        let scenarios = RouteScenarios::new(Arc::clone(courses), Arc::clone(&noises));
+        OptionTask::new(Arc::new(scenarios), Seed(seed).child("environment", index))
     };
-    let mut tasks: Vec<CourseTask> = (0..ENVIRONMENTS).map(task).collect();
+    let mut tasks: Vec<OptionTask> = (0..ENVIRONMENTS).map(task).collect();
     let bar = progress::bar(settings.max_env_steps, "learning");
     let mut interrupted = None;
     let mut curves = args.tensorboard.as_deref().map(CurveFolder::new);
@@ -206,20 +212,20 @@ fn courses(
     maps: u32,
     seed: Seed,
     bar: &indicatif::ProgressBar,
-) -> Result<Vec<Course>, Failure> {
-    let of_map = |index: u32| -> Result<Vec<Course>, Failure> {
+) -> Result<Vec<TrainingRoute>, Failure> {
+    let of_map = |index: u32| -> Result<Vec<TrainingRoute>, Failure> {
         let map_seed = seed.child("map", u64::from(index));
         let rng = &mut map_seed.stream("draw", 0);
         let mut grid = generate(kinds[index as usize % kinds.len()], MAP_M, CELL_M, rng);
         if !robot.can_turn_in_place() && (index as usize / kinds.len()).is_multiple_of(2) {
             grid = shrunk(&grid);
         }
-        let workspace = Workspace::new(grid, robot.clone());
+        let world = World::new(grid, robot.clone());
         let kind = if index.is_multiple_of(2) { OptionKind::Interface } else { OptionKind::Centroid };
-        let Ok(abstraction) = abstraction(&workspace, kind) else { return Ok(vec![]) };
-        let queries: Vec<Query> = (0..QUERIES).filter_map(|_| query(&workspace, rng)).collect();
+        let Ok(abstraction) = abstraction(&world, kind) else { return Ok(vec![]) };
+        let queries: Vec<Query> = (0..QUERIES).filter_map(|_| query(&world, rng)).collect();
         bar.inc(1);
-        Ok(prior::courses(&workspace, &abstraction, &queries, map_seed))
+        Ok(training_routes(&world, &abstraction, &queries, map_seed))
     };
     let all: Result<Vec<_>, Failure> = (0..maps).into_par_iter().map(of_map).collect();
     Ok(all?.into_iter().flatten().collect())
@@ -230,28 +236,28 @@ fn shrunk(grid: &OccupancyGrid) -> OccupancyGrid {
     OccupancyGrid::new(frame, grid.cells().to_vec()).expect("as many cells as before")
 }
 
-fn abstraction(workspace: &Workspace, kind: OptionKind) -> Result<Abstraction, Failure> {
-    let (_, regions, _) = pipeline::regions(workspace, "geometric")?;
-    let rbvd = pipeline::diagram(workspace, &regions, crate::args::Metric::Geodesic)?;
-    let options = OptionSet::synthesize(&rbvd, kind, &pipeline::option_settings(workspace));
-    Ok(Abstraction { rbvd: Arc::new(rbvd), options: Arc::new(options) })
+fn abstraction(world: &World, kind: OptionKind) -> Result<Abstraction, Failure> {
+    let (_, regions, _) = pipeline::regions(world, "geometric")?;
+    let rbvd = pipeline::diagram(world, &regions, crate::args::Metric::Geodesic)?;
+    let options = OptionSet::synthesize(&rbvd, kind, &pipeline::option_settings(world));
+    Ok(Abstraction { states: Arc::new(rbvd), options: Arc::new(options) })
 }
 
 /// A problem with room at both ends.
-fn query(workspace: &Workspace, rng: &mut Stream) -> Option<Query> {
-    let start = place(workspace, rng)?;
-    let goal = place(workspace, rng)?;
+fn query(world: &World, rng: &mut Stream) -> Option<Query> {
+    let start = place(world, rng)?;
+    let goal = place(world, rng)?;
     (start.distance_m(&goal) >= QUERY_MIN_M).then_some(Query { start, goal })
 }
 
-fn place(workspace: &Workspace, rng: &mut Stream) -> Option<Pose> {
-    let bounds = workspace.grid.frame().bounds();
-    let room_m = workspace.robot.footprint.circumscribed_radius_m() + 0.05;
+fn place(world: &World, rng: &mut Stream) -> Option<Pose> {
+    let bounds = world.grid.frame().bounds();
+    let room_m = world.robot.footprint.circumscribed_radius_m() + 0.05;
     for _ in 0..1000 {
         let x = rng.random_range(bounds.min.x..bounds.max.x);
         let y = rng.random_range(bounds.min.y..bounds.max.y);
         let pose = Pose::new(x, y, rng.random_range(-std::f64::consts::PI..std::f64::consts::PI));
-        if workspace.checker.field().sample(pose.position) > room_m {
+        if world.geometry.clearance().sample(pose.position) > room_m {
             return Some(pose);
         }
     }
@@ -272,11 +278,11 @@ fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> 
     for (name, policy) in candidates(&prior, &robot, &noise) {
         let trials: Vec<_> = courses
             .iter()
-            .flat_map(|course| course.certify(&policy, &noise, args.episodes, Seed(seed)))
+            .flat_map(|course| course.estimate(&policy, &noise, args.episodes, Seed(seed)))
             .collect();
         policies.insert(name, policy_score(&trials));
     }
-    let legs = courses.iter().map(Course::len).sum();
+    let legs = courses.iter().map(TrainingRoute::len).sum();
     let report = ScoreReport {
         schema: "sharp.prior.score/1",
         robot: robot.name,
@@ -304,16 +310,16 @@ fn candidates(prior: &Prior, robot: &RobotModel, noise: &NoiseModel) -> Vec<(Str
         policies.into_iter().enumerate().map(name).collect::<Vec<_>>()
     };
     let followers = Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
-    let paced = PacedFollower::candidates(robot).into_iter().map(OptionPolicy::Paced).collect();
+    let paced = ProfiledFollower::candidates(robot).into_iter().map(OptionPolicy::Profiled).collect();
     let mut all = named("prior", prior.candidates(robot, noise));
     all.extend(named("follower", followers));
     all.extend(named("paced", paced));
     all
 }
 
-fn policy_score(trials: &[sharp_plan::Certificate]) -> PolicyScore {
+fn policy_score(trials: &[SuccessEstimate]) -> PolicyScore {
     let count = trials.len().max(1) as f64;
-    let rates = || trials.iter().map(|trial| trial.tally.rate());
+    let rates = || trials.iter().map(|trial| trial.count.rate());
     let timed: Vec<f64> = trials.iter().map(|trial| trial.mean_time_s).filter(|s| s.is_finite()).collect();
     PolicyScore {
         success: rates().sum::<f64>() / count,

@@ -1,8 +1,9 @@
 //! `sharp regions train|predict|score`: the predictor of critical regions.
 
 use serde::Serialize;
+use sharp_drive::World;
 use sharp_motion::Steering;
-use sharp_plan::{Workspace, write_atomic};
+use sharp_plan::write_atomic;
 use sharp_regions::LabelRobot;
 use sharp_sim::RobotModel;
 use sharp_space::Region;
@@ -43,16 +44,16 @@ pub(crate) fn label_robot(robot: &RobotModel) -> LabelRobot {
 
 fn predict(args: &Abstract, json: bool) -> Result<Exit, Failure> {
     let map = input::map(&args.map)?;
-    let workspace = Workspace::new(map.grid, input::robot(&args.abstraction.robot)?);
-    let (heatmap, regions, source) = pipeline::regions(&workspace, &args.abstraction.regions)?;
+    let world = World::new(map.grid, input::robot(&args.abstraction.robot)?);
+    let (heatmap, regions, source) = pipeline::regions(&world, &args.abstraction.regions)?;
     if let Some(heatmap) = &heatmap {
-        pictures::write(&args.out, "regions", &pictures::regions(&workspace.grid, heatmap, &regions))?;
+        pictures::write(&args.out, "regions", &pictures::regions(&world.grid, heatmap, &regions))?;
     }
     let report = PredictReport {
         schema: "sharp.regions.predict/1",
-        robot: workspace.robot.name.clone(),
+        robot: world.robot.name.clone(),
         source,
-        regions: regions.iter().map(|region| region_report(&workspace, region)).collect(),
+        regions: regions.iter().map(|region| region_report(&world, region)).collect(),
     };
     write_atomic(&args.out.join("regions.json"), (to_json(&report) + "\n").as_bytes())?;
     if json {
@@ -63,8 +64,8 @@ fn predict(args: &Abstract, json: bool) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn region_report(workspace: &Workspace, region: &Region) -> RegionReport {
-    let frame = workspace.grid.frame();
+fn region_report(world: &World, region: &Region) -> RegionReport {
+    let frame = world.grid.frame();
     let center = region.center(frame);
     RegionReport { id: region.id.0, x: center.x, y: center.y, area_m2: region.area_m2(frame) }
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use serde::Serialize;
+use sharp_drive::World;
 use sharp_maps::load_doors;
-use sharp_plan::Workspace;
 use sharp_regions::{
     ComputeDevice, DoorScore, ExtractSettings, HELD_OUT_KINDS, LabelRobot, LabelSettings, Labels,
     RegionPredictor, RegionScore, RegionSettings, TrainSettings, VALIDATION_KINDS, find_regions,
@@ -211,17 +211,17 @@ fn at_doors(
     let map_args =
         MapArgs { map: map.to_owned(), resolution: None, unknown: Unknown::Blocked, allow_outside: false };
     let loaded = input::map(&map_args)?;
-    let workspace = Workspace::new(loaded.grid, robot);
+    let world = World::new(loaded.grid, robot);
     let (regions, source) = match &args.model {
-        Some(file) => (with_model(&workspace, &model(file)?), file.display().to_string()),
+        Some(file) => (with_model(&world, &model(file)?), file.display().to_string()),
         None => {
-            let (_, regions, source) = pipeline::regions(&workspace, &args.regions)?;
+            let (_, regions, source) = pipeline::regions(&world, &args.regions)?;
             (regions, source)
         }
     };
     let doors: Vec<Point> = load_doors(doors)?.iter().map(sharp_maps::Door::middle).collect();
-    let score = score_doors(&regions, workspace.checker.field(), &workspace.robot.footprint, &doors);
-    let (robot, map) = (workspace.robot.name.clone(), loaded.name);
+    let score = score_doors(&regions, world.geometry.clearance(), &world.robot.footprint, &doors);
+    let (robot, map) = (world.robot.name.clone(), loaded.name);
     let report = DoorReport { schema: "sharp.regions.score/1", robot, map, source, score };
     if json {
         say!("{}", to_json(&report));
@@ -235,7 +235,7 @@ fn at_doors(
     Ok(Exit::Done)
 }
 
-fn with_model(workspace: &Workspace, predictor: &RegionPredictor) -> Vec<Region> {
-    let footprint = &workspace.robot.footprint;
-    predict_regions(&workspace.grid, footprint, predictor, &RegionSettings::default()).regions
+fn with_model(world: &World, predictor: &RegionPredictor) -> Vec<Region> {
+    let footprint = &world.robot.footprint;
+    predict_regions(&world.grid, footprint, predictor, &RegionSettings::default()).regions
 }

@@ -17,7 +17,7 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     let simulator = input::simulator(&args.simulator)?;
     let plan = Arc::new(load_plan(&args.plan_dir)?);
     let mut settings = RunSettings::new(&plan, args.episodes, Seed(seed));
-    settings.simulator = simulator;
+    settings.simulator = plan.world.simulator(simulator);
     if let Some(noise) = &args.noise {
         settings.noise = input::noise(noise)?;
     }

@@ -4,9 +4,10 @@ use std::io::{BufRead, Write};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sharp_plan::{ComposedPolicy, Decision};
+use sharp_drive::{Command, Controller, Decision, Motion};
+use sharp_plan::{ComposedPolicy, Plan};
 use sharp_sim::{ActionSettings, RobotState};
-use sharp_space::{Point, Pose, Vector};
+use sharp_space::{Pose, Vector};
 
 use crate::args::Serve;
 use crate::commands::run::load_plan;
@@ -33,7 +34,7 @@ struct Reply<'a> {
 
 pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
     let plan = Arc::new(load_plan(&args.plan_dir)?);
-    let mut driver: Option<(ComposedPolicy, RobotState)> = None;
+    let mut driver: Option<Served> = None;
     let mut out = std::io::stdout().lock();
     for (index, line) in std::io::stdin().lock().lines().enumerate() {
         let line = line.map_err(|error| Failure::new("INPUT", format!("line {}: {error}", index + 1)))?;
@@ -42,16 +43,9 @@ pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
         }
         let reply = match parse(&line, index + 1) {
             Ok(request) => {
-                let state = state(&request, driver.as_ref().map(|(_, state)| state));
-                let policy = match driver.take() {
-                    Some((mut policy, _)) => {
-                        policy.observe(state);
-                        policy
-                    }
-                    None => ComposedPolicy::new(Arc::clone(&plan), state, true),
-                };
-                let (policy, _) = driver.insert((policy, state));
-                answer(policy, &state.pose)
+                let state = state(&request, driver.as_ref().map(|served| &served.state));
+                let served = driver.get_or_insert_with(|| Served::new(&plan, state));
+                served.answer(state)
             }
             Err(failure) => failure.to_json(),
         };
@@ -90,18 +84,42 @@ fn state(request: &Request, before: Option<&RobotState>) -> RobotState {
     state
 }
 
-fn answer(policy: &mut ComposedPolicy, pose: &Pose) -> String {
-    let decision = policy.decide();
-    let option = policy.leg().id.to_string();
-    let to = |point: Point| {
-        let towards = point - pose.position;
-        Some([point.x, point.y, towards.y.atan2(towards.x)])
-    };
-    let (waypoint, speed, status) = match decision {
-        Decision::Waypoint(point, speed) => (to(point), speed, "running"),
-        Decision::Recovering(point, speed) => (to(point), speed, "recovering"),
-        Decision::Reached => (None, 0.0, "reached"),
-        Decision::Lost => (None, 0.0, "lost"),
-    };
-    to_json(&Reply { waypoint, speed, option: &option, status })
+/// A robot that is being driven.
+struct Served {
+    policy: ComposedPolicy,
+    state: RobotState,
+    /// The last answer, until its outcome is known.
+    pending: Option<Command>,
+}
+
+impl Served {
+    fn new(plan: &Arc<Plan>, state: RobotState) -> Self {
+        Self { policy: ComposedPolicy::new(Arc::clone(plan), state, true), state, pending: None }
+    }
+
+    /// What to do for a robot that is now in `state`.
+    fn answer(&mut self, state: RobotState) -> String {
+        if let Some(command) = self.pending.take() {
+            self.policy.observe(&Motion::commanded(command, state));
+        }
+        self.state = state;
+        let decision = self.policy.decide();
+        let option = self.policy.option().id.to_string();
+        let (command, status) = match decision {
+            Decision::Drive(command) if self.policy.is_recovering() => (Some(command), "recovering"),
+            Decision::Drive(command) => (Some(command), "running"),
+            // Nobody tells this robot of contacts, so it is never asked to back off.
+            Decision::BackOff => (None, "recovering"),
+            Decision::Reached => (None, "reached"),
+            Decision::Lost => (None, "lost"),
+        };
+        self.pending = command;
+        let waypoint = command.map(|command| {
+            let point = command.to_world(&state.pose);
+            let towards = point - state.pose.position;
+            [point.x, point.y, towards.y.atan2(towards.x)]
+        });
+        let speed = command.map_or(0.0, |command| command.speed_mps);
+        to_json(&Reply { waypoint, speed, option: &option, status })
+    }
 }

@@ -4,11 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use sharp_guide::GuidePlanner;
+use sharp_drive::World;
 use sharp_maps::MapFile;
-use sharp_plan::{
-    LearningMode, Outcome, Plan, Query, Solution, SolveSettings, Workspace, solve, write_atomic,
-};
+use sharp_plan::{Conditions, Method, Outcome, Plan, Problem, Query, Solution, solve, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{Guide, Learning, Solve, Switch};
@@ -17,16 +15,6 @@ use crate::pipeline::{self, Built};
 use crate::progress::{SolveMonitor, Stopwatch, is_interrupted, spinner};
 use crate::report::{MapReport, Reuse, SolveReport, SolveTimes};
 use crate::{input, pictures};
-
-impl From<Learning> for LearningMode {
-    fn from(learning: Learning) -> Self {
-        match learning {
-            Learning::Fast => Self::Fast,
-            Learning::Paper => Self::Paper,
-            Learning::Prior => Self::Prior,
-        }
-    }
-}
 
 /// What solving gave: the report, and the plan if there is one.
 pub(crate) struct Solved {
@@ -61,20 +49,20 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
     let noise = input::noise(&args.noise)?;
     let robot = input::robot(&args.abstraction.robot)?;
-    let workspace = Workspace::new(map.grid.clone(), robot);
-    input::check_query(&workspace, &query)?;
+    let world = World::new(map.grid.clone(), robot);
+    input::check_query(&world, &query)?;
     args.out.as_deref().map_or(Ok(()), input::check_out)?;
-    let mut library = pipeline::library(args.library.as_deref(), &workspace, &noise, args.learning)?;
+    let mut library = pipeline::library(args.library.as_deref(), &world, &noise, args.learning)?;
     stopwatch.stop();
 
     let cache = library.folder().map(Path::to_owned);
-    let built = pipeline::abstraction(&workspace, &args.abstraction, cache.as_deref(), &mut stopwatch)?;
+    let built = pipeline::abstraction(&world, &args.abstraction, cache.as_deref(), &mut stopwatch)?;
     let abstraction = built.file.abstraction();
-    let mut settings = SolveSettings::new(&workspace, args.learning.into(), noise.clone(), Seed(seed));
-    settings.search.cost_update = args.cost_update == Switch::On;
-    settings.learn.failure_cost_s = args.failure_cost;
+    let mut method = Method::by_name(args.learning.name()).expect("every word names a method");
+    method.search.cost_update = args.cost_update == Switch::On;
+    method.failure_cost_s = args.failure_cost;
     if args.guide == Guide::Paper {
-        settings.search.guide.planner = GuidePlanner::LearnAndLink;
+        method = method.with_learn_and_link();
     }
     let curves = args.tensorboard.as_deref();
     let monitor = SolveMonitor::new(stopwatch, time_limit, spinner, curves);
@@ -82,24 +70,31 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     if args.learning != Learning::Paper {
         library.defer();
     }
-    let outcome = solve(&workspace, &abstraction, query, &settings, &mut library, &monitor)?;
+    let conditions = Conditions::new(&world, noise.clone());
+    let problem = Problem {
+        world: &world,
+        method: &method,
+        conditions: &conditions,
+        query,
+        seed: Seed(seed),
+        monitor: &monitor,
+    };
+    let outcome = solve(&problem, &abstraction, &mut library)?;
     let stopwatch = monitor.into_stopwatch();
 
-    let report = blank_report(args, seed, &map, &workspace, &built, abstraction.options.options().len());
+    let report = blank_report(args, seed, &map, &world, &built, abstraction.options.options().len());
     let plan = |solution: Solution| Plan {
-        workspace: workspace.clone(),
+        world: world.clone(),
         abstraction: abstraction.clone(),
         noise: noise.clone(),
-        learning: args.learning.into(),
-        cost_update: args.cost_update == Switch::On,
-        failure_cost_s: args.failure_cost,
+        method: method.clone(),
         seed: Seed(seed),
         solution,
     };
     let (mut report, plan) = match outcome {
         Outcome::Solved(solution) => {
             let plan = plan(*solution);
-            let folder = plan_folder(args, &map, &workspace)?;
+            let folder = plan_folder(args, &map, &world)?;
             let report = report.with_plan(&plan, &folder);
             (report, Some((plan, folder)))
         }
@@ -132,7 +127,7 @@ fn blank_report(
     args: &Solve,
     seed: u64,
     map: &MapFile,
-    workspace: &Workspace,
+    world: &World,
     built: &Built,
     options_available: usize,
 ) -> SolveReport {
@@ -140,8 +135,8 @@ fn blank_report(
         schema: "sharp.solve/1",
         status: "no_plan",
         reason: None,
-        robot: workspace.robot.name.clone(),
-        options: sharp_plan::kind_name(built.file.kind),
+        robot: world.robot.name.clone(),
+        options: built.file.kind.name(),
         learning: args.learning.name(),
         cost_update: args.cost_update.name(),
         noise: args.noise.clone(),
@@ -159,13 +154,13 @@ fn blank_report(
 }
 
 /// The folder asked for, or a fresh one.
-fn plan_folder(args: &Solve, map: &MapFile, workspace: &Workspace) -> Result<PathBuf, Failure> {
+fn plan_folder(args: &Solve, map: &MapFile, world: &World) -> Result<PathBuf, Failure> {
     if let Some(folder) = &args.out {
         return Ok(folder.clone());
     }
     let problem = args.problem.map_or(String::new(), |number| format!("-p{number}"));
-    let kind = sharp_plan::kind_name(args.abstraction.options.into());
-    let stem = format!("{}{problem}-{}-{kind}", map.name, workspace.robot.name);
+    let kind = sharp_options::OptionKind::from(args.abstraction.options).name();
+    let stem = format!("{}{problem}-{}-{kind}", map.name, world.robot.name);
     let root = Path::new("sharp-plans");
     (1..100_000)
         .map(|number| root.join(format!("{stem}-{number}")))
@@ -181,15 +176,15 @@ fn write_plan(
     report: &SolveReport,
 ) -> Result<(), Failure> {
     plan.save(folder, &built.file)?;
-    sharp_maps::save_ros(&plan.workspace.grid, &folder.join("map.yaml"))?;
+    sharp_maps::save_ros(&plan.world.grid, &folder.join("map.yaml"))?;
     if let Some(heatmap) = &built.heatmap {
         pictures::write(
             folder,
             "regions",
-            &pictures::regions(&plan.workspace.grid, heatmap, &pictures::regions_of(&built.file.rbvd)),
+            &pictures::regions(&plan.world.grid, heatmap, &pictures::regions_of(&built.file.rbvd)),
         )?;
     }
-    pictures::write(folder, "abstraction", &pictures::abstraction(&plan.workspace.grid, &plan.abstraction))?;
+    pictures::write(folder, "abstraction", &pictures::abstraction(&plan.world.grid, &plan.abstraction))?;
     pictures::write(folder, "plan", &pictures::plan(plan, query, &[]))?;
     write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;
     Ok(())

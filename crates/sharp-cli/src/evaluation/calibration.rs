@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sharp_plan::Tally;
+use sharp_drive::SuccessCount;
 
 use super::cases::Mean;
 use super::figure::{Axis, Figure, INK, Panel, SOFT, Style, TEXT, Table, legend, marker, percent};
@@ -20,7 +20,7 @@ struct Point<'a> {
     options: &'a str,
     /// Mean over the problems.
     predicted: f64,
-    measured: Tally,
+    measured: SuccessCount,
 }
 
 pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
@@ -78,9 +78,9 @@ fn predicted(lines: &[&ResultLine]) -> f64 {
 }
 
 /// The executions that the predictions of `lines` are held against; older results have no more than the others.
-fn measured(lines: &[&ResultLine]) -> Tally {
+fn measured(lines: &[&ResultLine]) -> SuccessCount {
     let tallies = || lines.iter().map(|line| line.calibration.unwrap_or(line.tally()));
-    Tally {
+    SuccessCount {
         episodes: tallies().map(|tally| tally.episodes).sum(),
         successes: tallies().map(|tally| tally.successes).sum(),
     }
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn predictions_are_held_against_the_larger_number_of_executions() {
-        let calibration = Some(Tally { episodes: 1000, successes: 975 });
+        let calibration = Some(SuccessCount { episodes: 1000, successes: 975 });
         let unlucky =
             ResultLine { successes: 18, calibration, ..ResultLine::example("a", "limo", "centroid", 1) };
         assert!(is_near(&unlucky) && is_inside(&unlucky), "0.98 of {:?}", measured(&[&unlucky]));

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sharp_plan::Tally;
+use sharp_drive::SuccessCount;
 
 use super::figure::Style;
 use super::lines::ResultLine;
@@ -107,7 +107,7 @@ pub(super) struct Case<'a> {
     pub(super) method: &'a str,
     pub(super) trials: usize,
     /// Executions of all trials.
-    pub(super) tally: Tally,
+    pub(super) tally: SuccessCount,
     /// Wall time until there is something to drive with, seconds.
     pub(super) ready_s: Mean,
     /// Simulated time of successful executions, seconds; `None` if there were none.
@@ -140,9 +140,9 @@ pub(super) fn cases<'a>(lines: &[&'a ResultLine]) -> Vec<Case<'a>> {
 }
 
 /// The executions of all `lines`.
-pub(super) fn tally(lines: &[&ResultLine]) -> Tally {
+pub(super) fn tally(lines: &[&ResultLine]) -> SuccessCount {
     let sum = |of: fn(&ResultLine) -> u32| lines.iter().map(|line| of(line)).sum();
-    Tally { episodes: sum(|line| line.episodes), successes: sum(|line| line.successes) }
+    SuccessCount { episodes: sum(|line| line.episodes), successes: sum(|line| line.successes) }
 }
 
 /// A mean with its 95 % interval after Student; of one value both ends are the value.
@@ -216,7 +216,7 @@ mod tests {
         let third = ResultLine { trial: 2, successes: 0, mean_sim_time_s: 0.0, ..first.clone() };
         let cases = cases(&[&first, &second, &third]);
         assert_eq!(cases.len(), 1, "{cases:?}");
-        assert_eq!(cases[0].tally, Tally { episodes: 60, successes: 30 });
+        assert_eq!(cases[0].tally, SuccessCount { episodes: 60, successes: 30 });
         assert_eq!(cases[0].trials, 3);
         assert_eq!(cases[0].driving_s.map(|time| time.mean), Some(25.0), "who never arrived has no time");
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sharp_plan::Tally;
+use sharp_drive::SuccessCount;
 
 use crate::args::Switch;
 use crate::outcome::Failure;
@@ -47,7 +47,7 @@ pub(crate) struct ResultLine {
     pub(crate) predicted_success: f64,
     /// More executions of a plan, to hold against what it predicted: as many as its prediction took.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) calibration: Option<Tally>,
+    pub(crate) calibration: Option<SuccessCount>,
     pub(crate) reuse: Reuse,
     pub(crate) env_steps: u64,
     pub(crate) gradient_steps: u64,
@@ -92,8 +92,8 @@ pub(crate) fn variant(recovery: Switch, cost_update: Switch) -> String {
 }
 
 impl ResultLine {
-    pub(crate) const fn tally(&self) -> Tally {
-        Tally { episodes: self.episodes, successes: self.successes }
+    pub(crate) const fn tally(&self) -> SuccessCount {
+        SuccessCount { episodes: self.episodes, successes: self.successes }
     }
 
     pub(crate) fn is_solved(&self) -> bool {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use sharp_plan::Tally;
+use sharp_drive::SuccessCount;
 
 use super::cases::ready_s;
 use super::lines::{ResultLine, default_regions};
@@ -11,7 +11,7 @@ use super::lines::{ResultLine, default_regions};
 /// Sums over some results.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sum {
-    tally: Tally,
+    tally: SuccessCount,
     collisions: u32,
     timeouts: u32,
     /// Simulated time of successful executions, seconds.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sharp_plan::Tally;
+use sharp_drive::SuccessCount;
 
 use super::cases::{Problem, Results, Setting, method, problem, tally};
 use super::figure::{Axis, Figure, INK, Panel, Style, TEXT, TOP, Table, legend, marker, percent, plain};
@@ -23,7 +23,7 @@ struct Series<'a> {
     method: &'a str,
     /// Problems that were measured at every factor.
     problems: usize,
-    points: Vec<(f64, Tally)>,
+    points: Vec<(f64, SuccessCount)>,
 }
 
 /// How many times the nominal noise `noise` is; `None` for noise of another kind.
@@ -41,7 +41,7 @@ pub(super) fn figure(results: &Results<'_>) -> Option<Figure> {
     if series.is_empty() {
         return None;
     }
-    let row = |series: &Series<'_>, &(factor, tally): &(f64, Tally)| {
+    let row = |series: &Series<'_>, &(factor, tally): &(f64, SuccessCount)| {
         vec![
             series.robot.to_owned(),
             label(series.method),
@@ -128,7 +128,7 @@ fn aside(index: usize) -> f64 {
 
 fn draw(panel: &mut Panel, series: &Series<'_>, (across, up): (&Axis, &Axis), aside: f64) {
     let (chart, style) = (&mut panel.chart, Style::of(series.method));
-    let place = |&(factor, tally): &(f64, Tally)| [across.at(factor) + aside, up.at(tally.rate())];
+    let place = |&(factor, tally): &(f64, SuccessCount)| [across.at(factor) + aside, up.at(tally.rate())];
     for pair in series.points.windows(2) {
         chart.line(place(&pair[0]), place(&pair[1]), style.color, 1.0);
     }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
-use sharp_plan::{FAILURE_COST_S, Plan, RunSettings, Tally, run as run_plan, write_atomic};
+use sharp_drive::{FAILURE_COST_S, SuccessCount};
+use sharp_plan::{Plan, RunSettings, run as run_plan, write_atomic};
 use sharp_space::Seed;
 
 use super::machine::machine;
@@ -200,10 +201,10 @@ fn run_settings(
 const CALIBRATION_EPISODES: u32 = 1000;
 
 /// Executes the plan often enough to tell a prediction that is three points off from luck.
-fn calibrate(plan: &Arc<Plan>, spec: &Spec, sharp: &SharpSpec) -> Tally {
+fn calibrate(plan: &Arc<Plan>, spec: &Spec, sharp: &SharpSpec) -> SuccessCount {
     let settings = run_settings(plan, spec, sharp, (CALIBRATION_EPISODES, "calibration"));
     let report = RunReport::new(plan, &run_plan(plan, &settings, &|| 0.0));
-    Tally { episodes: report.episodes, successes: report.successes }
+    SuccessCount { episodes: report.episodes, successes: report.successes }
 }
 
 fn with_solution(line: ResultLine, report: &SolveReport) -> ResultLine {

@@ -1,0 +1,168 @@
+//! The automaton of a chain of guided options: `q_i → q_{i+1}` as soon as `x ∈ I_{o_{i+1}}`.
+//!
+//! It keeps the books of an episode: which option runs, what the robot knows, where it is on the guide, how long
+//! each option took. It does not move a robot, so that it serves a simulator and a real robot alike.
+
+use std::sync::Arc;
+
+use sharp_guide::{GuidePath, GuidedOption};
+use sharp_sim::RobotState;
+
+use crate::episode::Motion;
+use crate::situation::{GuideProgress, GuideView, Observation, Situation};
+use crate::world::World;
+
+/// A guided option in a chain.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// The option.
+    pub option: Arc<GuidedOption>,
+    /// The option after it, where it is known: policies look ahead into its guide.
+    pub next: Option<Arc<GuidedOption>>,
+    /// Arc length of the guide from which on the option counts as done, metres; infinite where only its
+    /// termination set ends it.
+    pub until_m: f64,
+}
+
+impl Link {
+    /// `option`, with `next` after it.
+    #[must_use]
+    pub const fn new(option: Arc<GuidedOption>, next: Option<Arc<GuidedOption>>) -> Self {
+        Self { option, next, until_m: f64::INFINITY }
+    }
+
+    /// The links of options that follow one another.
+    pub fn chain(options: &[Arc<GuidedOption>]) -> Vec<Self> {
+        let next = |index: usize| options.get(index + 1).cloned();
+        options.iter().enumerate().map(|(index, option)| Self::new(Arc::clone(option), next(index))).collect()
+    }
+
+    fn guide(&self) -> GuideView<'_> {
+        let next: Option<&GuidePath> = self.next.as_deref().map(|next| &next.guide);
+        GuideView { current: &self.option.guide, next }
+    }
+}
+
+/// One option of an episode: how it was entered, and how long it has run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Visit {
+    /// The state in which it was entered.
+    pub entry: RobotState,
+    /// Simulated time since then, seconds.
+    pub time_s: f64,
+}
+
+/// The state of a chain of options that is being executed.
+#[derive(Clone, Debug)]
+pub struct Automaton {
+    links: Arc<[Link]>,
+    visits: Vec<Visit>,
+    observation: Observation,
+    progress: GuideProgress,
+    actions: u32,
+}
+
+impl Automaton {
+    /// The automaton at the beginning of `links`, for a robot that knows `observation`.
+    ///
+    /// # Panics
+    /// If there are no links.
+    #[must_use]
+    pub fn new(links: Arc<[Link]>, observation: Observation) -> Self {
+        assert!(!links.is_empty(), "a chain has options");
+        let progress = GuideProgress::default();
+        let mut this = Self { links, visits: Vec::new(), observation, progress, actions: 0 };
+        this.enter();
+        this
+    }
+
+    /// The link that runs.
+    #[must_use]
+    pub fn link(&self) -> &Link {
+        &self.links[self.index()]
+    }
+
+    /// The number of the link that runs, from 0.
+    #[must_use]
+    pub fn index(&self) -> usize {
+        self.visits.len() - 1
+    }
+
+    /// All links.
+    #[must_use]
+    pub const fn links(&self) -> &Arc<[Link]> {
+        &self.links
+    }
+
+    /// The options entered so far.
+    #[must_use]
+    pub fn visits(&self) -> &[Visit] {
+        &self.visits
+    }
+
+    /// What the robot knows of itself.
+    #[must_use]
+    pub const fn observation(&self) -> &Observation {
+        &self.observation
+    }
+
+    /// Where the robot is on the guide.
+    #[must_use]
+    pub const fn progress(&self) -> &GuideProgress {
+        &self.progress
+    }
+
+    /// What a policy sees.
+    #[must_use]
+    pub fn situation<'a>(&'a self, world: &'a World) -> Situation<'a> {
+        let Self { observation, progress, .. } = self;
+        Situation { world, observation, progress, guide: self.link().guide() }
+    }
+
+    /// Returns true if the option that runs is done.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        let Link { option, until_m, .. } = self.link();
+        option.is_done(&self.observation.state.pose) || self.progress.arc_m >= *until_m
+    }
+
+    /// Goes on to the next option while the one that runs is done; returns false if the last one is.
+    pub fn advance(&mut self) -> bool {
+        while self.is_done() {
+            if self.visits.len() == self.links.len() {
+                return false;
+            }
+            self.enter();
+        }
+        true
+    }
+
+    /// Takes in what came of an action.
+    pub fn observe(&mut self, world: &World, motion: &Motion) {
+        self.observation = self.observation.after(world, motion);
+        let index = self.index();
+        self.progress.update(&self.links[index].option.guide, &motion.after.pose);
+        self.visits[index].time_s += motion.time_s;
+        self.actions += 1;
+    }
+
+    /// Returns true if the option that runs has used up its horizon.
+    #[must_use]
+    pub fn is_late(&self) -> bool {
+        self.actions >= self.link().option.horizon_actions()
+    }
+
+    /// Actions since the option that runs was entered.
+    #[must_use]
+    pub const fn actions(&self) -> u32 {
+        self.actions
+    }
+
+    fn enter(&mut self) {
+        let state = self.observation.state;
+        let guide = &self.links[self.visits.len()].option.guide;
+        self.progress = GuideProgress::start(guide, &state.pose);
+        self.visits.push(Visit { entry: state, time_s: 0.0 });
+        self.actions = 0;
+    }
+}

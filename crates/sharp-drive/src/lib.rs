@@ -1,0 +1,76 @@
+//! Whatever moves a robot along a guide: observation, policies, slip estimate, the episode loop, estimates.
+//!
+//! The nouns: a [`World`] is a map with a robot in it. A [`Situation`] is what a policy sees at the moment of a
+//! decision, a [`Policy`] turns it into a [`Command`]. An [`Episode`] is one robot on its way: its
+//! [`act`](Episode::act) is the only place in this project that steps a vehicle, and [`Episode::drive`] is the
+//! only loop. An [`Automaton`] keeps the books of a chain of guided options, `q_i → q_{i+1}`. Predictions
+//! ([`MonteCarlo`]), learning ([`OptionTask`]) and execution all use these, so that what is predicted is what runs.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use sharp_drive::{Episode, EpisodeEnd, EpisodeRules, Follower, RouteController, Wall, World};
+//! use sharp_guide::GuidePath;
+//! use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
+//! use sharp_space::{OccupancyGrid, Pose, Seed};
+//!
+//! let grid = OccupancyGrid::from_ascii(0.5, &["...................."; 8].join("\n")).unwrap();
+//! let world = World::new(grid, RobotModel::husky());
+//! let route = GuidePath::new((0..=30).map(|i| Pose::new(2.0 + 0.2 * f64::from(i), 2.0, 0.0)).collect(), 0.25).unwrap();
+//!
+//! let simulator = world.simulator(SimulatorKind::Kinematic);
+//! let vehicle = world.vehicle(&*simulator, &NoiseModel::none(), true);
+//! let mut episode = Episode::new(vehicle, EpisodeRules::default());
+//! episode.begin(RobotState::at_rest(route.start()), Seed(1), 0);
+//! let mut controller = RouteController::new(&world, route, Box::new(Follower::cautious(&world.robot)), &episode);
+//! assert_eq!(episode.drive(&mut controller, &Wall::silent()), EpisodeEnd::Reached);
+//! ```
+
+pub mod conformance;
+
+mod automaton;
+mod chain;
+mod command;
+mod count;
+mod episode;
+mod estimate;
+mod features;
+mod follower;
+mod initial_states;
+mod motion_model;
+mod mppi;
+mod network;
+mod policy;
+mod presets;
+mod prior;
+mod route;
+mod situation;
+mod slip_filter;
+mod speed_profile;
+mod still;
+mod task;
+mod world;
+
+#[cfg(test)]
+mod test_worlds;
+
+pub use automaton::{Automaton, Link, Visit};
+pub use chain::{ChainRun, Driver};
+pub use command::Command;
+pub use count::SuccessCount;
+pub use episode::{
+    Controller, Decision, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Motion, Readiness,
+    TIME_LIMIT_MIN_S, Wall,
+};
+pub use estimate::{FAILURE_COST_S, MonteCarlo, SuccessEstimate};
+pub use follower::{Follower, SteeringRule};
+pub use initial_states::{InitialStates, StateSpread};
+pub use mppi::{Mppi, MppiSettings};
+pub use network::{Correction, NetworkPolicy, PolicyContext, PolicyInterface};
+pub use policy::{ForkPolicy, OptionPolicy, Policy};
+pub use prior::{Prior, prior_interface};
+pub use route::{Replan, RouteController};
+pub use situation::{GuideProgress, GuideView, Observation, Situation};
+pub use speed_profile::{ProfiledFollower, RouteFollower, SpeedProfile};
+pub use still::StandstillDetector;
+pub use task::{OptionTask, Scenario, ScenarioSource, SingleOption};
+pub use world::{AnyVehicle, World};

@@ -1,0 +1,138 @@
+//! The prior: one policy per kind of robot, learnt once on many generated maps, guides and noises.
+//!
+//! An option then begins with a policy that already drives: it is evaluated as it is, at several degrees of
+//! caution, and trained further only where that falls short. The network corrects a follower in the guide's own
+//! frame ([`PolicyInterface::Guide`]), so that what it learnt does not depend on the map. It is told which noise
+//! to expect and how much a contact matters ([`PolicyContext`]).
+
+use std::sync::{Arc, LazyLock};
+
+use sharp_rl::{Actor, SacState, StoreError};
+use sharp_sim::{NoiseModel, RobotModel};
+
+use crate::follower::{Follower, SteeringRule};
+use crate::network::{Correction, NetworkPolicy, PolicyContext, PolicyInterface};
+use crate::policy::OptionPolicy;
+
+/// Degrees of caution at which the prior is offered, the least first.
+const CAUTIONS: [f32; 3] = [0.0, CAUTION, 1.0];
+/// The degree of caution of a prior that is taken without a choice.
+const CAUTION: f32 = 0.5;
+
+/// A learnt policy for every option of a kind of robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    sac: SacState,
+    /// The policy alone, shared by all that are made of it.
+    actor: Arc<Actor>,
+}
+
+impl Prior {
+    /// The prior that `sac` was trained to be.
+    #[must_use]
+    pub fn new(sac: SacState) -> Self {
+        Self { actor: Arc::new(sac.actor.clone()), sac }
+    }
+
+    /// Reads a prior from the bytes of a safetensors file.
+    ///
+    /// # Errors
+    /// If the bytes are no networks of a learner, or not of a prior's observation and action.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, StoreError> {
+        let sac = SacState::from_bytes(bytes)?;
+        let spec = sac.actor.spec();
+        let expected = crate::features::GUIDE_FEATURES;
+        if spec.observation_len != expected || spec.action_len != PolicyInterface::ACTION_LEN {
+            return Err(StoreError::Header(format!("networks of {spec:?}, a prior has {expected} and 2")));
+        }
+        Ok(Self::new(sac))
+    }
+
+    /// The prior as bytes of a safetensors file.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.sac.to_bytes()
+    }
+
+    /// The shipped prior for robots that move as `robot` does.
+    #[must_use]
+    pub fn shipped(robot: &RobotModel) -> &'static Self {
+        let [turning, steering] = &*SHIPPED;
+        if robot.can_turn_in_place() { turning } else { steering }
+    }
+
+    /// Its networks, from which an option's own training begins.
+    #[must_use]
+    pub const fn networks(&self) -> &SacState {
+        &self.sac
+    }
+
+    /// Its policies for `robot` under `noise`, the least cautious first.
+    #[must_use]
+    pub fn candidates(&self, robot: &RobotModel, noise: &NoiseModel) -> Vec<OptionPolicy> {
+        CAUTIONS.into_iter().map(|caution| self.at(caution, robot, noise)).collect()
+    }
+
+    /// Its policy for `robot` under `noise` at middle caution.
+    #[must_use]
+    pub fn policy(&self, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
+        self.at(CAUTION, robot, noise)
+    }
+
+    fn at(&self, caution: f32, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
+        let interface = prior_interface(robot, PolicyContext::new(noise, caution));
+        OptionPolicy::Network(NetworkPolicy::new(interface, Arc::clone(&self.actor)))
+    }
+}
+
+/// For robots that turn in place, and for cars.
+static SHIPPED: LazyLock<[Prior; 2]> = LazyLock::new(|| {
+    let read = |bytes| Prior::from_bytes(bytes).expect("a test reads every shipped prior");
+    [
+        read(include_bytes!("../assets/prior-husky.safetensors")),
+        read(include_bytes!("../assets/prior-limo.safetensors")),
+    ]
+});
+
+/// What a prior of `robot` sees and what its action means.
+#[must_use]
+pub fn prior_interface(robot: &RobotModel, context: PolicyContext) -> PolicyInterface {
+    let top_mps = robot.max_speed_mps;
+    let (rule, bearing_rad) = if robot.can_turn_in_place() {
+        (SteeringRule::Pursuit { look_ahead_m: 0.5 }, 1.0)
+    } else {
+        (SteeringRule::Field { look_ahead_m: 0.4, softness_m: 0.5 }, 1.0)
+    };
+    // The action spans all speeds.
+    let base = Follower { rule, speed_mps: 0.5 * top_mps };
+    let correction = Correction { speed_mps: 0.5 * top_mps, bearing_rad };
+    PolicyInterface::Guide { base, correction, context }
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_rl::{EnvironmentSpec, SacSettings};
+    use sharp_space::Seed;
+
+    use super::*;
+
+    #[test]
+    fn every_shipped_prior_can_be_read_and_written() {
+        for robot in [RobotModel::husky(), RobotModel::limo()] {
+            let prior = Prior::shipped(&robot);
+            assert_eq!(prior.candidates(&robot, &NoiseModel::nominal()).len(), CAUTIONS.len());
+            let again = Prior::from_bytes(&prior.to_bytes()).expect("own bytes");
+            assert_eq!(&again, prior, "written and read");
+        }
+    }
+
+    #[test]
+    fn networks_of_another_shape_are_no_prior() {
+        let spec = EnvironmentSpec { observation_len: 3, action_len: 2 };
+        let mut rng = Seed(1).stream("networks", 0);
+        let bytes = SacState::new(spec, &SacSettings::fast(), &mut rng).to_bytes();
+        let error = Prior::from_bytes(&bytes).expect_err("three numbers are not enough").to_string();
+        assert!(error.contains("observation_len: 3"), "{error}");
+        assert!(Prior::from_bytes(b"nothing").is_err(), "not even networks");
+    }
+}

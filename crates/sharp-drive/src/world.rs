@@ -1,0 +1,72 @@
+//! A map and a robot in it: what stays the same while problems come and go.
+
+use std::sync::Arc;
+
+use sharp_guide::{GuideRobot, InflatedRobot, Steering, inflated_robots};
+use sharp_sim::{ActionSettings, NoiseModel, ObstacleMap, RobotModel, Simulator, SimulatorKind, Vehicle};
+use sharp_space::{FootprintChecker, OccupancyGrid, RobotGeometry};
+
+use crate::motion_model::MotionModel;
+
+/// A vehicle in a simulator that is chosen at run time.
+pub type AnyVehicle = Vehicle<Box<dyn Simulator>>;
+
+/// A map and a robot in it.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// The occupancy grid.
+    pub grid: Arc<OccupancyGrid>,
+    /// The robot.
+    pub robot: Arc<RobotModel>,
+    /// Where the robot's outline fits.
+    pub geometry: Arc<dyn RobotGeometry>,
+    /// The map as simulators see it.
+    pub obstacles: Arc<ObstacleMap>,
+    /// Larger robots with wider bends, for which guides are planned first; the robot itself is the last.
+    pub inflated: Arc<[InflatedRobot]>,
+    /// What the robot's actions do, as policies expect it.
+    pub(crate) model: Arc<MotionModel>,
+}
+
+impl World {
+    /// The world of `robot` in `grid`, with the exact test of its rectangular outline.
+    #[must_use]
+    pub fn new(grid: OccupancyGrid, robot: RobotModel) -> Self {
+        let geometry = Arc::new(FootprintChecker::new(&grid, robot.footprint));
+        Self::with_geometry(grid, robot, geometry)
+    }
+
+    /// The same with another test of where the robot fits.
+    #[must_use]
+    pub fn with_geometry(grid: OccupancyGrid, robot: RobotModel, geometry: Arc<dyn RobotGeometry>) -> Self {
+        let obstacles = Arc::new(ObstacleMap::new(&grid, robot.footprint));
+        let model = Arc::new(MotionModel::new(&robot));
+        let inflated = inflated_robots(&geometry, robot.min_turning_radius_m()).into();
+        Self { grid: Arc::new(grid), robot: Arc::new(robot), geometry, obstacles, inflated, model }
+    }
+
+    /// How the robot steers.
+    #[must_use]
+    pub fn steering(&self) -> Steering {
+        Steering::of(self.robot.min_turning_radius_m())
+    }
+
+    /// The robot as guides are planned for it.
+    #[must_use]
+    pub fn guide_robot(&self) -> GuideRobot<'_> {
+        GuideRobot { geometry: &*self.geometry, steering: self.steering(), inflated: &self.inflated }
+    }
+
+    /// A simulator of the robot in the map; vehicles drive in forks of it.
+    #[must_use]
+    pub fn simulator(&self, kind: SimulatorKind) -> Box<dyn Simulator> {
+        kind.build(Arc::clone(&self.obstacles), &self.robot)
+    }
+
+    /// A vehicle in a fork of `simulator`; its actions end at the first contact if `contact_ends`.
+    #[must_use]
+    pub fn vehicle(&self, simulator: &dyn Simulator, noise: &NoiseModel, contact_ends: bool) -> AnyVehicle {
+        let settings = ActionSettings { stop_at_contact: contact_ends, ..ActionSettings::default() };
+        Vehicle::new(simulator.fork(), Arc::clone(&self.robot), noise.clone(), settings)
+    }
+}

@@ -1,0 +1,163 @@
+//! Algorithm 1: from an abstraction and a problem to a policy composed of options.
+//!
+//! The numbers in `algorithm_1` are the lines of the paper's Algorithm 1. Lines 1 to 3 come before: the predictor of
+//! critical regions is a [`RegionDetector`](sharp_space::RegionDetector), and it comes trained. Lines 4 to 7 are
+//! [`construct`](crate::construct). What goes beyond the paper is marked, and [`Method::paper`](crate::Method::paper)
+//! switches it off.
+
+use std::sync::Arc;
+
+use sharp_drive::SuccessEstimate;
+use sharp_guide::{GuidedOption, LegId, join_guides};
+
+use crate::abstraction::Abstraction;
+use crate::files::FileError;
+use crate::learn::learn_missing;
+use crate::library::OptionLibrary;
+use crate::policies::Policies;
+use crate::problem::Problem;
+use crate::query::Phase;
+use crate::repair::{ENTERED_MIN, Repair, repair};
+use crate::search::Search;
+use crate::verify::{PlannedOption, Solution, verify};
+
+/// Plans looked at before the best so far is taken.
+const ATTEMPTS_MAX: usize = 24;
+/// Plans run from end to end before the best of them is taken.
+const VERIFIED_MAX: usize = 4;
+
+/// How solving ended.
+#[derive(Debug)]
+pub enum Outcome {
+    /// With a policy.
+    Solved(Box<Solution>),
+    /// There is no plan; says why.
+    NoPlan(String),
+    /// The monitor stopped it; what was learnt is in the library.
+    Stopped,
+}
+
+/// Algorithm 1 from line 8 on: `abstraction` is what lines 4 to 7 built. What is learnt stays in `library`.
+///
+/// # Errors
+/// Returns an error if the library cannot be written.
+pub fn solve(
+    problem: &Problem<'_>,
+    abstraction: &Abstraction,
+    library: &mut OptionLibrary,
+) -> Result<Outcome, FileError> {
+    let outcome = algorithm_1(problem, abstraction, library);
+    problem.monitor.phase(Phase::Done);
+    outcome
+}
+
+/// The algorithm itself, at most 60 lines.
+fn algorithm_1(
+    problem: &Problem<'_>,
+    abstraction: &Abstraction,
+    library: &mut OptionLibrary,
+) -> Result<Outcome, FileError> {
+    let Problem { world, method, query, seed, monitor, .. } = *problem;
+    monitor.phase(Phase::Search);
+    // 8: s_i, s_g <- get_abstract_states(x_i, x_g)
+    let known = Policies::guides(library);
+    let mut search = match Search::new(world, abstraction, method, query, known, seed) {
+        Ok(search) => search,
+        Err(unplaced) => return Ok(Outcome::NoPlan(unplaced.to_string())),
+    };
+    let mut policies = Policies::new(library);
+    let (mut best, mut verified): (Option<Solution>, usize) = (None, 0);
+    for _ in 0..ATTEMPTS_MAX {
+        // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
+        let Some(p) = cheapest(problem, &mut search, &policies) else { break };
+        // Beyond the paper: the guides of p are joined to one smooth path.
+        let p = join(problem, p);
+        // 10 to 20: Pi <- pi_0, o.policy for each o in p, pi_{n+1}; who has no policy (14) is trained (11, 16, 19)
+        if monitor.should_stop() || !learn_missing(problem, &p, &search, &mut policies)? {
+            return Ok(Outcome::Stopped);
+        }
+        // 17: the cost of an option is now what was measured, so a weak one may have a better alternative.
+        let is_changed = |search: &mut Search<'_>, policies: &Policies<'_>| {
+            cheapest(problem, search, policies).is_some_and(|other| names(&other) != names(&p))
+        };
+        if has_weak_option(problem, &p, &policies) && is_changed(&mut search, &policies) {
+            continue;
+        }
+        // Beyond the paper: Pi is repaired, its success is counted, and a weak one makes the search look again.
+        monitor.phase(Phase::Verify);
+        if !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)? {
+            return Ok(Outcome::Stopped);
+        }
+        let solution = verify(problem, &p, &policies);
+        let is_weak = solution.predicted.rate() < method.retry_below;
+        verified += 1;
+        if is_weak {
+            charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
+        }
+        let cost_s = |solution: &Solution| solution.estimate().cost_s(method.failure_cost_s);
+        if best.as_ref().is_none_or(|best| cost_s(&solution) < cost_s(best)) {
+            best = Some(solution);
+        }
+        if !is_weak || verified == VERIFIED_MAX || !is_changed(&mut search, &policies) {
+            break;
+        }
+    }
+    // 21: return Pi. A plan that never succeeds is none, unless whatever was learnt is to be kept.
+    let keeps_all = method.usable_success == 0.0;
+    Ok(match best.filter(|solution| keeps_all || solution.predicted.successes > 0) {
+        Some(solution) => Outcome::Solved(Box::new(solution)),
+        None => Outcome::NoPlan(describe_no_plan(&search)),
+    })
+}
+
+fn names(plan: &[Arc<GuidedOption>]) -> Vec<LegId> {
+    plan.iter().map(|option| option.id).collect()
+}
+
+/// The cheapest plan by all that is known by now.
+fn cheapest(
+    problem: &Problem<'_>,
+    search: &mut Search<'_>,
+    policies: &Policies<'_>,
+) -> Option<Vec<Arc<GuidedOption>>> {
+    let cost_s = |id: LegId| policies.get(id).map(|learnt| learnt.cost_s(problem.method.failure_cost_s));
+    search.plan(&cost_s, problem.monitor)
+}
+
+fn join(problem: &Problem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOption>> {
+    if !problem.method.join_guides {
+        return plan;
+    }
+    let robot = problem.world.guide_robot();
+    join_guides(plan, problem.query.start, &robot, &problem.method.search.guide)
+}
+
+fn has_weak_option(problem: &Problem<'_>, plan: &[Arc<GuidedOption>], policies: &Policies<'_>) -> bool {
+    let is_weak = |option: &Arc<GuidedOption>| {
+        let SuccessEstimate { count, .. } = policies.learnt(option.id).estimate;
+        count.episodes > 0 && count.rate() < problem.method.usable_success
+    };
+    plan.iter().any(is_weak)
+}
+
+/// What options succeed less often on arrival than by themselves is the price of their hand-overs.
+fn charge_hand_overs(search: &mut Search<'_>, steps: &[PlannedOption], failure_cost_s: f64) {
+    for pair in steps.windows(2) {
+        let [before, after] = pair else { continue };
+        let loss = after.learnt.estimate.count.rate() - after.on_arrival.rate();
+        if after.on_arrival.episodes >= ENTERED_MIN && loss > 0.0 {
+            search.charge(before.option.id, after.option.id, failure_cost_s * loss);
+        }
+    }
+}
+
+fn describe_no_plan(search: &Search<'_>) -> String {
+    let nothing = "no sequence of options leads from the start to the goal";
+    match search.unguided().next() {
+        Some((id, reason)) => {
+            let count = search.unguided().count();
+            format!("{nothing}; {count} options have no guide, among them {id}: {reason}")
+        }
+        None => nothing.to_owned(),
+    }
+}

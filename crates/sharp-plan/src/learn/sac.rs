@@ -1,0 +1,65 @@
+//! Training the network of one option by soft actor-critic.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use sharp_drive::{Link, NetworkPolicy, OptionPolicy, OptionTask, PolicyInterface, Scenario, SingleOption};
+use sharp_guide::Reward;
+use sharp_rl::{Progress, SacState, TrainSettings, fine_tune, train};
+use sharp_sim::RobotState;
+
+use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy};
+
+/// How a network is trained.
+#[derive(Clone, Debug)]
+pub(crate) struct SacTraining<'a> {
+    pub(crate) interface: PolicyInterface,
+    pub(crate) reward: Arc<dyn Reward>,
+    /// Networks to begin with; fresh ones if `None`.
+    pub(crate) networks: Option<&'a SacState>,
+    pub(crate) settings: &'a TrainSettings,
+    /// Environments that are stepped in turn.
+    pub(crate) environments: u64,
+}
+
+/// Trains a network on the option of `task` and estimates how often it succeeds.
+pub(crate) fn train_network(
+    task: &LearningTask<'_>,
+    training: &SacTraining<'_>,
+    monitor: &dyn LearningMonitor,
+) -> Result<LearntPolicy, LearnFailure> {
+    let source =
+        Arc::new(SingleOption { scenario: scenario(task, training), states: Arc::clone(&task.states) });
+    let environment =
+        |index| OptionTask::new(Arc::clone(&source) as _, task.seed.child("environment", index));
+    let mut environments: Vec<OptionTask> = (0..training.environments).map(environment).collect();
+    let mut observer = |progress: &Progress<'_>| {
+        monitor.trained(progress);
+        if monitor.should_stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let mut rng = task.seed.stream("sac", 0);
+    let trained = match training.networks {
+        Some(networks) => fine_tune(&mut environments, networks, training.settings, &mut rng, &mut observer),
+        None => train(&mut environments, training.settings, &mut rng, &mut observer),
+    };
+    let trained = trained.map_err(LearnFailure::Broken)?;
+    if monitor.should_stop() {
+        return Err(LearnFailure::Stopped);
+    }
+    let network = NetworkPolicy::new(training.interface, Arc::new(trained.actor));
+    let policy = OptionPolicy::Network(network);
+    let estimate = task.estimate(&policy);
+    Ok(LearntPolicy { policy, estimate, env_steps: trained.env_steps, gradient_steps: trained.updates })
+}
+
+fn scenario(task: &LearningTask<'_>, training: &SacTraining<'_>) -> Scenario {
+    Scenario {
+        world: task.world.clone(),
+        simulator: task.conditions.simulator.fork(),
+        noise: task.conditions.noise.clone(),
+        links: Arc::new([Link::new(Arc::clone(task.option), task.next.cloned())]),
+        interface: training.interface,
+        reward: Arc::clone(&training.reward),
+        start: RobotState::at_rest(task.option.guide.start()),
+    }
+}

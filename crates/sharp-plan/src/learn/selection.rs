@@ -1,0 +1,192 @@
+//! The default: the cheapest policy at hand that succeeds often enough, and training only in repairs.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use sharp_drive::{
+    Follower, OptionPolicy, PolicyContext, Prior, ProfiledFollower, SuccessCount, SuccessEstimate, World,
+    prior_interface,
+};
+use sharp_guide::ProgressReward;
+use sharp_rl::{Exploration, SacSettings, StopRule, TrainSettings};
+use sharp_sim::NoiseModel;
+
+use super::sac::{SacTraining, train_network};
+use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner};
+
+/// Rounds of successive halving: the share of the screening episodes that each candidate drives, and how many
+/// candidates go on. Those that the last round leaves are compared on all episodes.
+const ROUNDS: [(f64, usize); 3] = [(0.1, 10), (0.3, 5), (1.0, 3)];
+/// Reward of a contact while a prior is trained on: what it was trained with at full caution.
+const FINE_CONTACT: f64 = -20.0;
+
+/// Chooses among followers and the prior at several degrees of caution; trains the prior on where a plan falls
+/// short and nothing at hand succeeds often enough.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Selection {
+    /// Episodes in which candidates are compared.
+    pub screening_episodes: u32,
+    /// The prior is trained on where nothing else succeeds as often as this, share of episodes; 0 for never.
+    pub train_below: f64,
+    /// Budget and hyperparameters of training.
+    pub train: TrainSettings,
+    /// Environments that are stepped in turn.
+    pub environments: u64,
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Self {
+            screening_episodes: 200,
+            train_below: 0.97,
+            // Few steps: the prior drives already, and what it has not learnt then it hardly will.
+            train: TrainSettings {
+                sac: SacSettings {
+                    learning_rate: 3e-4,
+                    updates_per_step: 0.25,
+                    warmup_steps: 1_000,
+                    exploration: Exploration::Policy,
+                    zero_last_actor_layer: false,
+                    ..crate::training_route::prior_train_settings().sac
+                },
+                max_env_steps: 12_000,
+                evaluate_every: 2_000,
+                stop: StopRule::Success { rate: 0.995, episodes: 400 },
+                ..TrainSettings::fast()
+            },
+            environments: 16,
+        }
+    }
+}
+
+impl OptionLearner for Selection {
+    fn learn(
+        &self,
+        task: &LearningTask<'_>,
+        monitor: &dyn LearningMonitor,
+    ) -> Result<LearntPolicy, LearnFailure> {
+        let chosen = self.choose(task, None, monitor)?.expect("there are candidates");
+        let (estimate, policy) = chosen;
+        let alone = task.estimate_alone(&policy, estimate);
+        Ok(LearntPolicy::untrained(policy, alone))
+    }
+
+    fn improve(
+        &self,
+        task: &LearningTask<'_>,
+        beaten: SuccessCount,
+        may_train: bool,
+        monitor: &dyn LearningMonitor,
+    ) -> Result<Option<LearntPolicy>, LearnFailure> {
+        let chosen = self.choose(task, Some(beaten), monitor)?;
+        let most = chosen.as_ref().map_or(beaten, |(judged, _)| judged.count);
+        let mut effort = (0, 0);
+        // What a first choice lacks the plan may not need: training takes longer than all the rest.
+        if may_train && most.rate() < self.train_below {
+            let trained = self.train_prior(task, monitor)?;
+            let judged = if task.tail.is_empty() { trained.estimate } else { task.judge(&trained.policy) };
+            if judged.count.successes > most.successes {
+                return Ok(Some(trained));
+            }
+            effort = (trained.env_steps, trained.gradient_steps);
+        }
+        Ok(chosen.map(|(judged, policy)| {
+            let estimate = task.estimate_alone(&policy, judged);
+            let (env_steps, gradient_steps) = effort;
+            LearntPolicy { policy, estimate, env_steps, gradient_steps }
+        }))
+    }
+
+    fn candidates(&self, world: &World, noise: &NoiseModel) -> Vec<OptionPolicy> {
+        let robot = &world.robot;
+        let mut all: Vec<OptionPolicy> =
+            Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
+        all.extend(ProfiledFollower::candidates(robot).into_iter().map(OptionPolicy::Profiled));
+        all.extend(Prior::shipped(robot).candidates(robot, noise));
+        all
+    }
+
+    fn train_below(&self) -> f64 {
+        self.train_below
+    }
+}
+
+impl Selection {
+    /// The cheapest policy at hand that succeeds as often as wanted; where none does, the one that succeeds most
+    /// often, if that is more often than `beaten`.
+    fn choose(
+        &self,
+        task: &LearningTask<'_>,
+        beaten: Option<SuccessCount>,
+        monitor: &dyn LearningMonitor,
+    ) -> Result<Option<(SuccessEstimate, OptionPolicy)>, LearnFailure> {
+        let episodes = task.estimate_episodes;
+        let allowed = (f64::from(episodes) * (1.0 - task.wanted_success)).floor() as u32;
+        let mut most = beaten;
+        let mut best: Option<(SuccessEstimate, OptionPolicy)> = None;
+        for policy in self.cheapest(task) {
+            if monitor.should_stop() {
+                return Err(LearnFailure::Stopped);
+            }
+            let useful = most.map_or(episodes, |most| most.failures().saturating_sub(1));
+            let judged = task.judge_while(&policy, useful.max(allowed));
+            if judged.count.episodes < episodes {
+                continue;
+            }
+            let succeeds = judged.count.failures() <= allowed;
+            if succeeds || most.is_none_or(|most| judged.count.successes > most.successes) {
+                most = Some(judged.count);
+                best = Some((judged, policy));
+            }
+            if succeeds {
+                break;
+            }
+        }
+        Ok(best)
+    }
+
+    /// The few candidates that cost least.
+    fn cheapest(&self, task: &LearningTask<'_>) -> Vec<OptionPolicy> {
+        let candidates = self.candidates(task.world, &task.conditions.noise);
+        successive_halving(candidates, self.screening_episodes, |policy, episodes, round| {
+            let trial = task.monte_carlo(episodes, "screen", round);
+            trial.estimate(&task.drivers(policy), &task.states).cost_s(task.failure_cost_s)
+        })
+    }
+
+    /// The prior, trained further on this option alone.
+    fn train_prior(
+        &self,
+        task: &LearningTask<'_>,
+        monitor: &dyn LearningMonitor,
+    ) -> Result<LearntPolicy, LearnFailure> {
+        let robot = &task.world.robot;
+        let reward = ProgressReward { contact: FINE_CONTACT, ..ProgressReward::default() };
+        let training = SacTraining {
+            interface: prior_interface(robot, PolicyContext::new(&task.conditions.noise, 1.0)),
+            reward: Arc::new(reward),
+            networks: Some(Prior::shipped(robot).networks()),
+            settings: &self.train,
+            environments: self.environments,
+        };
+        train_network(task, &training, monitor)
+    }
+}
+
+/// Successive halving (Jamieson and Talwalkar 2016): each round compares fewer candidates on more episodes.
+/// `cost_s(policy, episodes, round)` drives a policy. The cheapest comes first.
+pub(crate) fn successive_halving(
+    mut candidates: Vec<OptionPolicy>,
+    episodes: u32,
+    cost_s: impl Fn(&OptionPolicy, u32, u64) -> f64 + Sync,
+) -> Vec<OptionPolicy> {
+    for (round, (share, keep)) in (0..).zip(ROUNDS) {
+        let episodes = (share * f64::from(episodes)).ceil() as u32;
+        let mut costs: Vec<(f64, OptionPolicy)> =
+            candidates.into_par_iter().map(|policy| (cost_s(&policy, episodes, round), policy)).collect();
+        costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        candidates = costs.into_iter().take(keep).map(|(_, policy)| policy).collect();
+    }
+    candidates
+}

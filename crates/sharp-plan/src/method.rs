@@ -1,0 +1,239 @@
+//! A method is data: how options get policies, how plans are searched, checked and repaired.
+//!
+//! [`Method::paper`] keeps to the paper, [`Method::fast`] is the default, [`Method::prior`] takes the prior as it
+//! is. Nothing outside this file asks which of them is at work.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use sharp_drive::FAILURE_COST_S;
+use sharp_guide::{GuidePlanner, GuideSettings, PlannerKind};
+use sharp_options::AllowedRule;
+
+use crate::learn::{OptionLearner, PaperProtocol, PriorOnly, Selection};
+
+/// How a problem is solved.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Method {
+    /// Its name, as plans and libraries record it.
+    pub name: String,
+    /// How an option gets its policy.
+    pub learner: Arc<dyn OptionLearner>,
+    /// How guides are planned.
+    pub guides: Arc<dyn GuidePlanner>,
+    /// What the search may assume and must respect.
+    pub search: SearchSettings,
+    /// In which order the options of a plan are learnt.
+    pub order: LearningOrder,
+    /// Fresh episodes that estimate a policy.
+    pub estimate_episodes: u32,
+    /// Success wanted of an option, share of episodes.
+    pub option_success: f64,
+    /// What a failure costs beside the seconds of a success, seconds: the more, the safer and slower.
+    pub failure_cost_s: f64,
+    /// Smooths the guides of a plan together; false is the paper's rule.
+    pub join_guides: bool,
+    /// An option that succeeds less often than this makes the search look for a better way; 0 keeps whatever was
+    /// learnt, as the paper does.
+    pub usable_success: f64,
+    /// A plan that succeeds less often than this makes the search try other ways; 0 for never.
+    pub retry_below: f64,
+    /// How a plan that succeeds too rarely is repaired.
+    pub repair: RepairSettings,
+    /// Fresh runs through the whole plan that its predicted success is counted on.
+    pub verify_episodes: u32,
+}
+
+/// In which order the options of a plan are learnt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LearningOrder {
+    /// One after the other, each from where the one before it arrives and with the next in view.
+    Chained,
+    /// Each on its own and all at once: the paper's way.
+    Independent,
+}
+
+/// How a plan is repaired.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct RepairSettings {
+    /// Rounds; 0 is the paper's rule.
+    pub rounds: u32,
+    /// Runs through the whole plan that look for weak options, each round.
+    pub episodes: u32,
+    /// Success wanted of the whole plan; its options share the failures that are left.
+    pub wanted_success: f64,
+    /// Episodes in which one policy for all new options is compared with others.
+    pub screening_episodes: u32,
+}
+
+/// What the search may assume and must respect.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct SearchSettings {
+    /// Speed that turns lengths into seconds before anything was measured, as a share of the top speed.
+    pub nominal_speed: f64,
+    /// Seconds added to an option without a policy: what training is worth; 0 is the paper's rule.
+    pub untrained_surcharge_s: f64,
+    /// Seconds added to an option that passes a centroid by. No later problem can reuse a first or last one, few
+    /// can reuse the others, and the paper has none.
+    pub bypass_surcharge_s: f64,
+    /// Options may pass a centroid by; false keeps to the paper's.
+    pub bypasses: bool,
+    /// Learnt options cost what was measured of them (line 17 of Algorithm 1); false keeps the first costs.
+    pub cost_update: bool,
+    /// Largest turn between two guides that a robot which turns in place makes without stopping, radians.
+    pub smooth_turn_rad: f64,
+    /// Which states an option may use besides its endpoints.
+    pub allowed: AllowedRule,
+    /// How guides are planned, where the planner is ours.
+    pub guide: GuideSettings,
+}
+
+impl Default for SearchSettings {
+    fn default() -> Self {
+        Self {
+            nominal_speed: 0.5,
+            untrained_surcharge_s: 8.0,
+            bypass_surcharge_s: 14.0,
+            bypasses: true,
+            cost_update: true,
+            // The footprint swings out in a turn: beyond 75 degrees it needs clearance or a smaller circle.
+            smooth_turn_rad: 75.0_f64.to_radians(),
+            allowed: AllowedRule::Code,
+            guide: GuideSettings::default(),
+        }
+    }
+}
+
+impl Method {
+    /// The default: the cheapest policy at hand that succeeds often enough, guides with a safety margin that join
+    /// smoothly, and repairs until the plan succeeds as wanted.
+    #[must_use]
+    pub fn fast() -> Self {
+        let selection = Selection::default();
+        let screening_episodes = selection.screening_episodes;
+        Self {
+            name: "fast".to_owned(),
+            learner: Arc::new(selection),
+            retry_below: 0.97,
+            repair: RepairSettings { rounds: 3, episodes: 1000, wanted_success: 0.99, screening_episodes },
+            ..Self::prior()
+        }
+    }
+
+    /// The paper's protocol (Algorithm 1, Sec. 4 and 5): every option is trained, nothing is repaired.
+    #[must_use]
+    pub fn paper() -> Self {
+        let guide = GuideSettings { margins: false, ..GuideSettings::default() };
+        Self {
+            name: "paper".to_owned(),
+            learner: Arc::new(PaperProtocol::default()),
+            search: SearchSettings {
+                untrained_surcharge_s: 0.0,
+                bypasses: false,
+                allowed: AllowedRule::Paper,
+                ..SearchSettings::default()
+            },
+            order: LearningOrder::Independent,
+            join_guides: false,
+            usable_success: 0.0,
+            ..Self::prior()
+        }
+        .with_guides(guide)
+    }
+
+    /// The shipped prior as it is, to compare with: nothing to choose from, no training, no repairs.
+    #[must_use]
+    pub fn prior() -> Self {
+        let search = SearchSettings::default();
+        Self {
+            name: "prior".to_owned(),
+            learner: Arc::new(PriorOnly),
+            guides: search.guide.to_planner(),
+            search,
+            order: LearningOrder::Chained,
+            estimate_episodes: 1000,
+            option_success: 0.99,
+            failure_cost_s: FAILURE_COST_S,
+            join_guides: true,
+            usable_success: 0.9,
+            retry_below: 0.0,
+            repair: RepairSettings {
+                rounds: 0,
+                episodes: 1000,
+                wanted_success: 0.99,
+                screening_episodes: 200,
+            },
+            verify_episodes: 1000,
+        }
+    }
+
+    /// The method called `name`, one of `fast`, `paper` and `prior`.
+    #[must_use]
+    pub fn by_name(name: &str) -> Option<Self> {
+        match name {
+            "fast" => Some(Self::fast()),
+            "paper" => Some(Self::paper()),
+            "prior" => Some(Self::prior()),
+            _ => None,
+        }
+    }
+
+    /// The same with our guide planner under these settings.
+    #[must_use]
+    pub fn with_guides(self, guide: GuideSettings) -> Self {
+        Self { guides: guide.to_planner(), search: SearchSettings { guide, ..self.search }, ..self }
+    }
+
+    /// The same with guides by Learn and Link, as in the paper.
+    #[must_use]
+    pub fn with_learn_and_link(self) -> Self {
+        let guide = GuideSettings { planner: PlannerKind::LearnAndLink, ..self.search.guide };
+        self.with_guides(guide)
+    }
+
+    /// The same with another guide planner. A plan that is read from a file goes on with ours.
+    #[must_use]
+    pub fn with_guide_planner(self, guides: Arc<dyn GuidePlanner>) -> Self {
+        Self { guides, ..self }
+    }
+
+    /// The same with another learner, under a name of its own: policies of two learners never mix in a library.
+    #[must_use]
+    pub fn with_learner(self, name: &str, learner: Arc<dyn OptionLearner>) -> Self {
+        Self { name: name.to_owned(), learner, ..self }
+    }
+
+    /// The same with fewer or more episodes: `estimate` for each policy, `verify` for the whole plan, `repair` for
+    /// each round of repairs.
+    #[must_use]
+    pub fn with_episodes(self, estimate: u32, verify: u32, repair: u32) -> Self {
+        let repair = RepairSettings { episodes: repair, ..self.repair };
+        Self { estimate_episodes: estimate, verify_episodes: verify, repair, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_method_is_known_by_its_name() {
+        for method in [Method::fast(), Method::paper(), Method::prior()] {
+            let named = Method::by_name(&method.name).expect("its own name");
+            assert_eq!(named.search, method.search, "{}", method.name);
+        }
+        assert!(Method::by_name("slow").is_none());
+    }
+
+    #[test]
+    fn the_paper_keeps_to_its_rules() {
+        let paper = Method::paper();
+        assert_eq!(paper.search.allowed, AllowedRule::Paper);
+        assert!(!paper.search.guide.margins && !paper.search.bypasses && !paper.join_guides);
+        assert_eq!((paper.repair.rounds, paper.usable_success), (0, 0.0));
+    }
+}

@@ -1,0 +1,309 @@
+//! A* over options (Algorithm 1, line 9).
+//!
+//! The nodes are options (with `π_0` and `π_{n+1}`), so that the hand-over from one to the next can carry a cost: a
+//! guide that ends facing east cannot always be followed by one that begins to the south. Costs are seconds. The
+//! heuristic is the straight distance at top speed, which never overestimates.
+
+use std::collections::BTreeMap;
+
+use petgraph::algo::astar;
+use petgraph::graph::{DiGraph, NodeIndex};
+use sharp_guide::{LegId, UnguidedOption};
+use sharp_options::{Endpoint, EndpointId, EndpointSite, OptionId, OptionKind, OptionSet, OptionSpec};
+use sharp_rbvd::{StateAbstraction, StateId};
+use sharp_space::{Point, Pose};
+
+/// An option that the search may choose, before it has a guide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// The option.
+    pub option: UnguidedOption,
+    /// True if it passes a centroid by: that of the state that it begins, ends or, an option, is on the way in.
+    pub is_bypass: bool,
+    /// The endpoint it ends at; `None` at the goal configuration.
+    pub endpoint: Option<EndpointId>,
+}
+
+impl Candidate {
+    /// Its name.
+    #[must_use]
+    pub const fn id(&self) -> LegId {
+        self.option.id
+    }
+
+    /// The straight distance between its ends, metres.
+    #[must_use]
+    pub fn straight_m(&self) -> f64 {
+        (self.option.end - self.option.start).norm()
+    }
+}
+
+/// All options of one problem, and which may follow which.
+#[derive(Clone, Debug)]
+pub struct OptionGraph {
+    graph: DiGraph<Option<Candidate>, ()>,
+    nodes: BTreeMap<LegId, NodeIndex>,
+    root: NodeIndex,
+    goal: Point,
+}
+
+impl OptionGraph {
+    /// The graph for a problem from `start` to `goal`, whose states are `s_i` and `s_g`.
+    #[must_use]
+    pub fn new(
+        states: &dyn StateAbstraction,
+        options: &OptionSet,
+        start: (Pose, StateId),
+        goal: (Pose, StateId),
+    ) -> Self {
+        let mut graph = DiGraph::new();
+        let root = graph.add_node(None);
+        let mut this = Self { graph, nodes: BTreeMap::new(), root, goal: goal.0.position };
+        let mut entering: BTreeMap<(EndpointId, StateId), Vec<NodeIndex>> = BTreeMap::new();
+        for candidate in first_legs(states, options, start, goal) {
+            let (endpoint, to) = (candidate.endpoint, candidate.option.to);
+            let node = this.add(candidate);
+            this.graph.add_edge(root, node, ());
+            if let Some(endpoint) = endpoint {
+                entering.entry((endpoint, to)).or_default().push(node);
+            }
+        }
+        let all = || options.options().iter().chain(options.bypasses());
+        for spec in all() {
+            let node = this.add(option_candidate(options, spec));
+            entering.entry((spec.termination, spec.enters())).or_default().push(node);
+        }
+        for candidate in last_legs(states, options, goal) {
+            let (endpoint, from) = (candidate.endpoint, candidate.option.from);
+            let node = this.add(Candidate { endpoint: None, ..candidate });
+            for &before in endpoint.iter().flat_map(|&e| entering.get(&(e, from)).into_iter().flatten()) {
+                this.graph.add_edge(before, node, ());
+            }
+        }
+        for spec in all() {
+            let node = this.nodes[&LegId::Option(spec.id)];
+            for &before in entering.get(&(spec.initiation, spec.leaves())).into_iter().flatten() {
+                if !goes_back(this.graph[before].as_ref(), spec) {
+                    this.graph.add_edge(before, node, ());
+                }
+            }
+        }
+        this
+    }
+
+    fn add(&mut self, candidate: Candidate) -> NodeIndex {
+        let id = candidate.id();
+        let node = self.graph.add_node(Some(candidate));
+        self.nodes.insert(id, node);
+        node
+    }
+
+    /// The leg called `id`.
+    #[must_use]
+    pub fn candidate(&self, id: LegId) -> Option<&Candidate> {
+        self.nodes.get(&id).and_then(|&node| self.graph[node].as_ref())
+    }
+
+    /// The cheapest sequence of options from start to goal, or `None` if every one has an infinite cost.
+    ///
+    /// `cost(leg)` and `join(before, after)` are seconds, not negative, infinite where impossible;
+    /// `cost` may not fall below the straight distance divided by `speed_max_mps`.
+    pub fn search(
+        &self,
+        speed_max_mps: f64,
+        cost: impl Fn(&Candidate) -> f64,
+        join: impl Fn(&Candidate, &Candidate) -> f64,
+    ) -> Option<(f64, Vec<LegId>)> {
+        let is_goal = |node: NodeIndex| self.graph[node].as_ref().is_some_and(|leg| leg.endpoint.is_none());
+        let edge_cost = |before: NodeIndex, after: NodeIndex| {
+            let after = self.graph[after].as_ref().map_or(0.0, |leg| {
+                cost(leg) + self.graph[before].as_ref().map_or(0.0, |before| join(before, leg))
+            });
+            debug_assert!(after >= 0.0, "costs are not negative");
+            after
+        };
+        let heuristic = |node: NodeIndex| {
+            self.graph[node].as_ref().map_or(0.0, |leg| (leg.option.end - self.goal).norm() / speed_max_mps)
+        };
+        use petgraph::visit::EdgeRef;
+        let found = astar(&self.graph, self.root, is_goal, |e| edge_cost(e.source(), e.target()), heuristic);
+        let (seconds, nodes) = found.filter(|(seconds, _)| seconds.is_finite())?;
+        Some((
+            seconds,
+            nodes.iter().filter_map(|&node| self.graph[node].as_ref().map(Candidate::id)).collect(),
+        ))
+    }
+}
+
+/// A centroid option back to where the one before came from never helps.
+fn goes_back(before: Option<&Candidate>, spec: &OptionSpec) -> bool {
+    let came_from =
+        before.filter(|before| matches!(before.id(), LegId::Option(_))).map(|before| before.option.from);
+    spec.id.kind() == OptionKind::Centroid && came_from == Some(spec.id.to())
+}
+
+fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
+    let center = |id: EndpointId| options.endpoint(id).center;
+    Candidate {
+        option: UnguidedOption {
+            id: LegId::Option(spec.id),
+            from: spec.id.from(),
+            to: spec.id.to(),
+            start: center(spec.initiation),
+            end: center(spec.termination),
+            heading: None,
+        },
+        is_bypass: matches!(spec.id, OptionId::Bypass { .. }),
+        endpoint: Some(spec.termination),
+    }
+}
+
+/// `π_0`: from the start to each endpoint of its own state, and to the centroids next door, so that
+/// nobody has to drive back to a centroid first; straight to the goal if it lies in the same state.
+fn first_legs(
+    states: &dyn StateAbstraction,
+    options: &OptionSet,
+    (start, from): (Pose, StateId),
+    (goal, goal_state): (Pose, StateId),
+) -> Vec<Candidate> {
+    let heading = Some(start.heading);
+    let leg = |id, to, end| UnguidedOption { id, from, to, start: start.position, end, heading };
+    let mut legs = Vec::new();
+    if from == goal_state {
+        let option = leg(LegId::Direct, goal_state, goal.position);
+        legs.push(Candidate { option, is_bypass: false, endpoint: None });
+    }
+    for endpoint_id in endpoints_near(states, options, from) {
+        let endpoint = options.endpoint(endpoint_id);
+        let to = other_state(&endpoint.states, from);
+        legs.push(Candidate {
+            option: leg(LegId::First(endpoint_id.0), to, endpoint.center),
+            is_bypass: is_centroid_elsewhere(endpoint, from),
+            endpoint: Some(endpoint_id),
+        });
+    }
+    legs
+}
+
+/// `π_{n+1}`: from each endpoint of the goal's state, and from the centroids next door, to the goal.
+fn last_legs(
+    states: &dyn StateAbstraction,
+    options: &OptionSet,
+    (goal, to): (Pose, StateId),
+) -> Vec<Candidate> {
+    let leg = |endpoint_id: EndpointId| {
+        let endpoint = options.endpoint(endpoint_id);
+        // Entered from the other side of an interface, the robot is about to be in the goal's state.
+        let from = if endpoint.states.len() > 1 { to } else { endpoint.states[0] };
+        let id = LegId::Last(endpoint_id.0, from);
+        let (start, end) = (endpoint.center, goal.position);
+        Candidate {
+            option: UnguidedOption { id, from, to, start, end, heading: None },
+            is_bypass: is_centroid_elsewhere(endpoint, to),
+            endpoint: Some(endpoint_id),
+        }
+    };
+    endpoints_near(states, options, to).into_iter().map(leg).collect()
+}
+
+/// The endpoints of `state` itself, and the centroids of its neighbours.
+fn endpoints_near(states: &dyn StateAbstraction, options: &OptionSet, state: StateId) -> Vec<EndpointId> {
+    let neighbors = states.neighbors(state);
+    let is_near = |endpoint: &Endpoint| match endpoint.site {
+        EndpointSite::Centroid(other) => other == state || neighbors.contains(&other),
+        EndpointSite::Interface(_) | EndpointSite::Custom(_) => endpoint.states.contains(&state),
+    };
+    let numbered = options.endpoints().iter().zip(0..);
+    numbered.filter(|(endpoint, _)| is_near(endpoint)).map(|(_, index)| EndpointId(index)).collect()
+}
+
+fn is_centroid_elsewhere(endpoint: &Endpoint, state: StateId) -> bool {
+    matches!(endpoint.site, EndpointSite::Centroid(other) if other != state)
+}
+
+/// The state on the far side of an interface, or the centroid's own.
+fn other_state(states: &[StateId], near: StateId) -> StateId {
+    states.iter().copied().find(|&state| state != near).unwrap_or(near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::query::Query;
+    use crate::test_worlds::{HALL, RING, SEALED, along, world};
+
+    fn graph(drawing: &str, kind: OptionKind, query: Query) -> OptionGraph {
+        let (_, abstraction) = world(drawing, kind);
+        let place = |pose: Pose| (pose, abstraction.states.state_at(pose.position).expect("a state"));
+        OptionGraph::new(&*abstraction.states, &abstraction.options, place(query.start), place(query.goal))
+    }
+
+    fn names(legs: &[LegId]) -> String {
+        legs.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The names of the shortest plan; first and last legs past a centroid cost 10 m more.
+    fn shortest(drawing: &str, kind: OptionKind, query: Query) -> Option<String> {
+        let cost = |leg: &Candidate| leg.straight_m() + if leg.is_bypass { 10.0 } else { 0.0 };
+        graph(drawing, kind, query).search(1.0, cost, |_, _| 0.0).map(|(_, legs)| names(&legs))
+    }
+
+    #[test]
+    fn a_hall_is_crossed_from_region_to_region() {
+        let centroid = shortest(HALL, OptionKind::Centroid, along());
+        assert_eq!(centroid.as_deref(), Some("first:0 c:0-1 c:1-2 last:2"));
+        let interface = shortest(HALL, OptionKind::Interface, along());
+        assert_eq!(interface.as_deref(), Some("first:0 i:0-1-2 last:1"));
+    }
+
+    #[test]
+    fn within_a_state_one_leg_is_enough() {
+        let nearby = Query { start: Pose::new(1.0, 2.0, 0.0), goal: Pose::new(2.5, 2.2, 0.0) };
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            assert_eq!(shortest(HALL, kind, nearby).as_deref(), Some("first:goal"), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn sealed_rooms_have_no_plan() {
+        let through = Query { start: Pose::new(2.0, 1.4, 0.0), goal: Pose::new(6.0, 1.4, 0.0) };
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            assert_eq!(shortest(SEALED, kind, through), None, "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn an_impossible_leg_or_join_sends_the_plan_the_other_way_round() {
+        let across = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+        let graph = graph(RING, OptionKind::Centroid, across);
+        let (length_m, legs) =
+            graph.search(1.0, Candidate::straight_m, |_, _| 0.0).expect("a ring has two ways");
+        let banned =
+            |leg: &Candidate| if legs.contains(&leg.id()) { f64::INFINITY } else { leg.straight_m() };
+        let (detour_m, others) = graph.search(1.0, banned, |_, _| 0.0).expect("the other way");
+        assert!(detour_m > length_m, "{detour_m} m is no detour from {length_m} m");
+        assert!(legs.iter().all(|leg| !others.contains(leg)), "{} keeps a banned leg", names(&others));
+        let broken = |before: &Candidate, after: &Candidate| {
+            let joins = legs.windows(2).any(|pair| pair == [before.id(), after.id()]);
+            if joins { f64::INFINITY } else { 0.0 }
+        };
+        let (_, rejoined) = graph.search(1.0, Candidate::straight_m, broken).expect("the other way");
+        assert!(rejoined != legs, "{} keeps a join that is impossible", names(&rejoined));
+        assert!(graph.search(1.0, |_| f64::INFINITY, |_, _| 0.0).is_none(), "no leg is possible");
+    }
+
+    #[test]
+    fn the_cheapest_plan_agrees_with_an_uninformed_search() {
+        let across = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            let graph = graph(RING, kind, across);
+            let turn = |before: &Candidate, after: &Candidate| {
+                f64::from((before.option.to.0 + after.option.to.0) % 3)
+            };
+            let informed = graph.search(1.0, Candidate::straight_m, turn).map(|found| found.0);
+            // At an endless top speed the heuristic knows nothing.
+            let blind = graph.search(f64::INFINITY, Candidate::straight_m, turn).map(|found| found.0);
+            assert_eq!(informed, blind, "{kind:?}: the heuristic overestimates");
+        }
+    }
+}

@@ -1,0 +1,332 @@
+//! A plan on disk: everything that running it takes, and nothing about when it was made.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use sharp_drive::{SuccessCount, SuccessEstimate, World};
+use sharp_guide::{Goal, GuidePath, GuidedOption, LegId, OptionSpace};
+use sharp_options::{OptionKind, OptionSettings};
+use sharp_rbvd::{Rbvd, StateAbstraction, StateId};
+use sharp_sim::{NoiseModel, RobotModel};
+use sharp_space::{OccupancyGrid, Pose, Seed};
+
+use crate::abstraction::Abstraction;
+use crate::files::{self, FileError};
+use crate::learn::LearntPolicy;
+use crate::library::{FORMAT, PolicyFile};
+use crate::method::Method;
+use crate::query::Query;
+use crate::verify::{PlannedOption, Solution};
+
+const PLAN_FILE: &str = "plan.ron";
+const ABSTRACTION_FILE: &str = "abstraction.ron";
+
+/// How an abstraction was made: what a file needs beside the states.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AbstractionFile {
+    format: u32,
+    /// Hash of the map it belongs to.
+    pub map: String,
+    /// Where the regions came from.
+    pub regions: String,
+    /// The kind of its options.
+    pub kind: OptionKind,
+    /// How the options were made.
+    pub options: OptionSettings,
+    /// The states.
+    pub rbvd: Rbvd,
+}
+
+impl AbstractionFile {
+    /// A file for the map hashed as `map`, its regions made by `regions`. States that are no diagram are stored as
+    /// one, with the same cells, regions and portals.
+    #[must_use]
+    pub fn new(
+        map: String,
+        regions: String,
+        kind: OptionKind,
+        options: OptionSettings,
+        states: &dyn StateAbstraction,
+    ) -> Self {
+        Self { format: FORMAT, map, regions, kind, options, rbvd: Rbvd::from_abstraction(states) }
+    }
+
+    /// Writes it to `path`.
+    ///
+    /// # Errors
+    /// Returns an error that names the file if it cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), FileError> {
+        files::write_ron(path, self)
+    }
+
+    /// Reads it from `path`, for the map hashed as `map`.
+    ///
+    /// # Errors
+    /// Returns an error that names the file if it is damaged, of another format or for another map.
+    pub fn load(path: &Path, map: &str) -> Result<Self, FileError> {
+        let file: Self = files::read_ron(path)?;
+        check_header(path, (file.format, &file.map), map)?;
+        Ok(file)
+    }
+
+    /// The abstraction, its options synthesised again.
+    #[must_use]
+    pub fn abstraction(&self) -> Abstraction {
+        let states = Arc::new(self.rbvd.clone());
+        let options = sharp_options::OptionSet::synthesize(&*states, self.kind, &self.options);
+        Abstraction { states, options: Arc::new(options) }
+    }
+}
+
+/// Refuses a file of another format or for another map.
+fn check_header(path: &Path, (format, found): (u32, &str), map: &str) -> Result<(), FileError> {
+    if format != FORMAT {
+        return Err(FileError::content(path, format!("format is {format}, expected {FORMAT}")));
+    }
+    if found != map {
+        return Err(FileError::content(path, "belongs to another map"));
+    }
+    Ok(())
+}
+
+/// The hash that names a map: its frame and its cells.
+#[must_use]
+pub fn map_hash(grid: &OccupancyGrid) -> String {
+    let frame = grid.frame();
+    let mut bytes = format!("{}x{} {:?} {:?}\n", frame.width, frame.height, frame.resolution_m, frame.origin)
+        .into_bytes();
+    bytes.extend(grid.cells().iter().map(|&cell| cell as u8));
+    files::hash(&bytes)
+}
+
+/// A solution with the world it was made in.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Map and robot.
+    pub world: World,
+    /// The abstraction it was searched in.
+    pub abstraction: Abstraction,
+    /// The noise it was verified under.
+    pub noise: NoiseModel,
+    /// How it was made, and how it goes on where the robot has to recover.
+    pub method: Method,
+    /// The seed it was made with.
+    pub seed: Seed,
+    /// The composed policy.
+    pub solution: Solution,
+}
+
+/// The word for a method in plan files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum LearningWord {
+    Fast,
+    Prior,
+    Paper,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlanFile {
+    format: u32,
+    map: String,
+    robot: RobotModel,
+    noise: NoiseModel,
+    learning: LearningWord,
+    cost_update: bool,
+    failure_cost_s: f64,
+    seed: Seed,
+    start: Pose,
+    goal: Pose,
+    predicted: SuccessCount,
+    predicted_time_s: f64,
+    legs: Vec<StepFile>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StepFile {
+    id: LegId,
+    from: StateId,
+    to: StateId,
+    guide: GuidePath,
+    policy: PolicyFile,
+    verified: SuccessCount,
+    on_arrival: SuccessCount,
+    mean_time_s: f64,
+    env_steps: u64,
+    gradient_steps: u64,
+    reused: bool,
+}
+
+impl Plan {
+    /// Writes the plan into `folder`; the abstraction stands beside it as `abstraction`.
+    ///
+    /// # Errors
+    /// Returns an error that names the file that could not be written.
+    pub fn save(&self, folder: &Path, abstraction: &AbstractionFile) -> Result<(), FileError> {
+        abstraction.save(&folder.join(ABSTRACTION_FILE))?;
+        let steps = self.solution.steps.iter().map(|step| step_file(step, folder));
+        let file = PlanFile {
+            format: FORMAT,
+            map: map_hash(&self.world.grid),
+            robot: (*self.world.robot).clone(),
+            noise: self.noise.clone(),
+            learning: match self.method.name.as_str() {
+                "prior" => LearningWord::Prior,
+                "paper" => LearningWord::Paper,
+                _ => LearningWord::Fast,
+            },
+            cost_update: self.method.search.cost_update,
+            failure_cost_s: self.method.failure_cost_s,
+            seed: self.seed,
+            start: self.solution.query.start,
+            goal: self.solution.query.goal,
+            predicted: self.solution.predicted,
+            predicted_time_s: self.solution.predicted_time_s,
+            legs: steps.collect::<Result<_, _>>()?,
+        };
+        files::write_ron(&folder.join(PLAN_FILE), &file)
+    }
+
+    /// Reads the plan in `folder`, made in `grid`.
+    ///
+    /// # Errors
+    /// Returns an error that names the file that is missing, damaged, of another format or for another map.
+    pub fn load(folder: &Path, grid: OccupancyGrid) -> Result<Self, FileError> {
+        let path = folder.join(PLAN_FILE);
+        let file: PlanFile = files::read_ron(&path)?;
+        let map = map_hash(&grid);
+        check_header(&path, (file.format, &file.map), &map)?;
+        let abstraction = AbstractionFile::load(&folder.join(ABSTRACTION_FILE), &map)?.abstraction();
+        let word = match file.learning {
+            LearningWord::Fast => "fast",
+            LearningWord::Prior => "prior",
+            LearningWord::Paper => "paper",
+        };
+        let mut method = Method::by_name(word).expect("its own word");
+        method.search.cost_update = file.cost_update;
+        method.failure_cost_s = file.failure_cost_s;
+        let space = abstraction.space(method.search.allowed);
+        let goal = Goal { point: file.goal.position, radius_m: file.robot.goal_tolerance_m };
+        let steps = file.legs.into_iter().map(|step| planned_option(step, folder, &space, goal));
+        let steps = steps.collect::<Result<Vec<_>, _>>()?;
+        if steps.is_empty() {
+            return Err(FileError::content(&path, "legs is empty, expected at least one"));
+        }
+        let query = Query { start: file.start, goal: file.goal };
+        let (predicted, predicted_time_s) = (file.predicted, file.predicted_time_s);
+        Ok(Self {
+            world: World::new(grid, file.robot),
+            abstraction,
+            noise: file.noise,
+            method,
+            seed: file.seed,
+            solution: Solution { query, steps, predicted, predicted_time_s },
+        })
+    }
+}
+
+fn step_file(step: &PlannedOption, folder: &Path) -> Result<StepFile, FileError> {
+    let PlannedOption { option, learnt, reused, on_arrival, .. } = step;
+    Ok(StepFile {
+        id: option.id,
+        from: option.from,
+        to: option.to,
+        guide: option.guide.clone(),
+        policy: PolicyFile::save(&learnt.policy, folder)?,
+        verified: learnt.estimate.count,
+        on_arrival: *on_arrival,
+        mean_time_s: learnt.estimate.mean_time_s,
+        env_steps: learnt.env_steps,
+        gradient_steps: learnt.gradient_steps,
+        reused: *reused,
+    })
+}
+
+fn planned_option(
+    file: StepFile,
+    folder: &Path,
+    space: &OptionSpace,
+    goal: Goal,
+) -> Result<PlannedOption, FileError> {
+    let learnt = LearntPolicy {
+        policy: file.policy.load(folder)?,
+        estimate: SuccessEstimate { count: file.verified, mean_time_s: file.mean_time_s },
+        env_steps: file.env_steps,
+        gradient_steps: file.gradient_steps,
+    };
+    let option = GuidedOption::new(space, file.id, (file.from, file.to), file.guide, goal);
+    let (option, arrival_time_s) = (Arc::new(option), file.mean_time_s);
+    Ok(PlannedOption { option, learnt, reused: file.reused, on_arrival: file.on_arrival, arrival_time_s })
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::test_worlds::{self, HALL, SEALED};
+
+    fn saved(kind: OptionKind) -> (Arc<Plan>, tempfile::TempDir) {
+        let plan = test_worlds::plan(kind);
+        let map = map_hash(&plan.world.grid);
+        let file = AbstractionFile::new(
+            map,
+            "drawn".to_owned(),
+            kind,
+            OptionSettings::default(),
+            &*plan.abstraction.states,
+        );
+        let folder = tempfile::tempdir().unwrap();
+        plan.save(folder.path(), &file).unwrap();
+        (plan, folder)
+    }
+
+    #[test]
+    fn a_plan_survives_a_round_trip() {
+        for kind in [OptionKind::Centroid, OptionKind::Interface] {
+            let (plan, folder) = saved(kind);
+            let read = Plan::load(folder.path(), (*plan.world.grid).clone()).unwrap();
+            assert_eq!(read.solution.query, plan.solution.query, "{kind:?}");
+            assert_eq!(*read.world.robot, *plan.world.robot, "{kind:?}");
+            assert_eq!((&*read.method.name, read.method.search), ("fast", plan.method.search), "{kind:?}");
+            for (read, written) in read.solution.steps.iter().zip(&plan.solution.steps) {
+                assert_eq!(read.option.id, written.option.id, "{kind:?}");
+                assert_eq!(read.option.guide, written.option.guide, "{}", written.option.id);
+                assert_eq!(read.option.target, written.option.target, "{}", written.option.id);
+                assert_eq!(read.option.source, written.option.source, "{}", written.option.id);
+            }
+            assert_eq!(read.solution.steps.len(), plan.solution.steps.len(), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn a_plan_for_another_map_is_refused() {
+        let (_, folder) = saved(OptionKind::Centroid);
+        let (other, _) = test_worlds::world(SEALED, OptionKind::Centroid);
+        let error = Plan::load(folder.path(), (*other.grid).clone()).unwrap_err().to_string();
+        assert!(error.contains("plan.ron") && error.contains("another map"), "{error}");
+    }
+
+    #[test]
+    fn one_cell_or_one_metre_makes_another_map() {
+        let grid = |drawing: &str, resolution_m| OccupancyGrid::from_ascii(resolution_m, drawing).unwrap();
+        let hash = map_hash(&grid("##\n.#", 0.4));
+        assert_eq!(hash, map_hash(&grid("##\n.#", 0.4)), "the same map");
+        for other in [grid("##\n..", 0.4), grid("##\n.#", 0.5), grid("##\n?#", 0.4), grid("##.#", 0.4)] {
+            assert_ne!(hash, map_hash(&other), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn the_options_of_an_abstraction_are_made_again_the_same() {
+        let (_, abstraction) = test_worlds::world(HALL, OptionKind::Interface);
+        let (settings, kind) = (OptionSettings::default(), OptionKind::Interface);
+        let file =
+            AbstractionFile::new("m".to_owned(), "drawn".to_owned(), kind, settings, &*abstraction.states);
+        assert_eq!(file.abstraction().options, abstraction.options);
+    }
+}

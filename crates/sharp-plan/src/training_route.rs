@@ -1,0 +1,169 @@
+//! What a prior is trained on: a few options in a row, of many plans in many maps.
+//!
+//! An episode begins somewhere in a plan and runs on over the hand-overs: what counts is not to finish an option
+//! but to arrive so that the next can be driven as well.
+
+use std::sync::Arc;
+
+use rand::RngExt;
+use sharp_drive::{
+    Driver, InitialStates, Link, MonteCarlo, OptionPolicy, PolicyContext, PolicyInterface, Scenario,
+    ScenarioSource, StateSpread, SuccessEstimate, World, prior_interface,
+};
+use sharp_guide::{GuidedOption, LegId, ProgressReward};
+use sharp_rl::{SacSettings, StopRule, TrainSettings};
+use sharp_sim::{NoiseModel, RobotState, SimulatorKind};
+use sharp_space::{Seed, Stream};
+
+use crate::abstraction::Abstraction;
+use crate::method::{Method, SearchSettings};
+use crate::query::Query;
+use crate::search::Search;
+
+/// Options that an episode runs through at most.
+const OPTIONS_MAX: usize = 3;
+/// Initial states kept of each option.
+const STATE_POOL: usize = 48;
+/// Strength of the noises trained with, as shares of the built-in ones.
+const STRENGTHS: std::ops::Range<f64> = 0.5..1.1;
+/// Reward of a contact at no and at full caution.
+const CONTACT: [f64; 2] = [-3.0, -20.0];
+
+/// A plan in a map: options that follow one another, and where each may begin.
+#[derive(Clone, Debug)]
+pub struct TrainingRoute {
+    world: World,
+    options: Vec<Arc<GuidedOption>>,
+    states: Vec<InitialStates>,
+}
+
+impl TrainingRoute {
+    /// Number of options.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.options.len()
+    }
+
+    /// Returns true if it has no options; no planned route is empty.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.options.is_empty()
+    }
+
+    /// How often `policy` succeeds on each option under `noise`.
+    #[must_use]
+    pub fn estimate(
+        &self,
+        policy: &OptionPolicy,
+        noise: &NoiseModel,
+        episodes: u32,
+        seed: Seed,
+    ) -> Vec<SuccessEstimate> {
+        let simulator = self.world.simulator(SimulatorKind::Kinematic);
+        let trial = MonteCarlo::new(&self.world, &*simulator, noise).with_episodes(episodes).with_seed(seed);
+        let options = self.options.iter().zip(&self.states).enumerate();
+        let of = |(index, (option, states)): (usize, (&Arc<GuidedOption>, &InitialStates))| {
+            trial.estimate(&[Driver::new(option, policy, self.options.get(index + 1))], states)
+        };
+        options.map(of).collect()
+    }
+}
+
+/// The plans for `queries` in one map. Queries without a plan are left out.
+#[must_use]
+pub fn training_routes(
+    world: &World,
+    abstraction: &Abstraction,
+    queries: &[Query],
+    seed: Seed,
+) -> Vec<TrainingRoute> {
+    let search = SearchSettings { bypasses: false, ..SearchSettings::default() };
+    let method = Method { search, ..Method::prior() };
+    let route = |query: &Query| {
+        let mut search = Search::new(world, abstraction, &method, *query, [], seed).ok()?;
+        let options = search.plan(&|_| None, &())?;
+        let states = options.iter().map(|option| states(world, option, query, seed)).collect();
+        Some(TrainingRoute { world: world.clone(), options, states })
+    };
+    queries.iter().filter_map(route).collect()
+}
+
+fn states(world: &World, option: &GuidedOption, query: &Query, seed: Seed) -> InitialStates {
+    match option.id {
+        LegId::First(_) | LegId::Direct => InitialStates::exactly(RobotState::at_rest(query.start)),
+        LegId::Option(_) | LegId::Last(..) => {
+            InitialStates::spread(world, option, &StateSpread::default(), STATE_POOL, seed)
+        }
+    }
+}
+
+/// Parts of routes under noises of many strengths, at every degree of caution.
+#[derive(Clone, Debug)]
+pub struct RouteScenarios {
+    routes: Arc<Vec<TrainingRoute>>,
+    noises: Arc<Vec<NoiseModel>>,
+}
+
+impl RouteScenarios {
+    /// Parts of `routes` under `noises`.
+    ///
+    /// # Panics
+    /// If there are no routes or no noises.
+    #[must_use]
+    pub fn new(routes: Arc<Vec<TrainingRoute>>, noises: Arc<Vec<NoiseModel>>) -> Self {
+        assert!(!routes.is_empty() && !noises.is_empty(), "training needs routes and noises");
+        Self { routes, noises }
+    }
+}
+
+impl ScenarioSource for RouteScenarios {
+    fn draw(&self, rng: &mut Stream) -> Scenario {
+        let route = &self.routes[rng.random_range(0..self.routes.len())];
+        let TrainingRoute { world, options, states } = route;
+        let first = rng.random_range(0..options.len());
+        let last = (first + OPTIONS_MAX).min(options.len()) - 1;
+        let noise = &self.noises[rng.random_range(0..self.noises.len())];
+        let noise = noise.scaled(rng.random_range(STRENGTHS));
+        let caution: f64 = rng.random();
+        let contact = CONTACT[0] + (CONTACT[1] - CONTACT[0]) * caution;
+        let reward = ProgressReward { contact, success: 1.0, stray: 0.0, ..ProgressReward::default() };
+        let link = |index: usize| Link::new(Arc::clone(&options[index]), options.get(index + 1).cloned());
+        Scenario {
+            simulator: world.simulator(SimulatorKind::Kinematic),
+            interface: interface(world, PolicyContext::new(&noise, caution as f32)),
+            noise,
+            links: (first..=last).map(link).collect(),
+            reward: Arc::new(reward),
+            start: states[first].draw(rng),
+            world: world.clone(),
+        }
+    }
+
+    fn observation_len(&self) -> usize {
+        interface(&self.routes[0].world, PolicyContext::default()).observation_len()
+    }
+}
+
+fn interface(world: &World, context: PolicyContext) -> PolicyInterface {
+    prior_interface(&world.robot, context)
+}
+
+/// How a prior is trained.
+#[must_use]
+pub fn prior_train_settings() -> TrainSettings {
+    TrainSettings {
+        sac: SacSettings {
+            hidden: vec![128, 128],
+            learning_rate: 5e-4,
+            updates_per_step: 0.25,
+            warmup_steps: 4_000,
+            zero_last_actor_layer: true,
+            ..SacSettings::fast()
+        },
+        max_env_steps: 600_000,
+        evaluate_every: 20_000,
+        evaluation_episodes: 800,
+        stop: StopRule::Never,
+        ..TrainSettings::fast()
+    }
+}

@@ -1,0 +1,129 @@
+//! How often a plan succeeds: fresh runs from its start to its goal.
+
+use std::sync::Arc;
+
+use sharp_drive::{ChainRun, Driver, EpisodeEnd, SuccessCount, SuccessEstimate};
+use sharp_guide::{GuidedOption, Role};
+use sharp_sim::RobotState;
+
+use crate::learn::LearntPolicy;
+use crate::policies::Policies;
+use crate::problem::Problem;
+use crate::query::Query;
+
+/// A step of a solution.
+#[derive(Clone, Debug)]
+pub struct PlannedOption {
+    /// The option and its guide.
+    pub option: Arc<GuidedOption>,
+    /// Its policy.
+    pub learnt: LearntPolicy,
+    /// True for an option whose policy existed before this problem.
+    pub reused: bool,
+    /// How often it succeeded when entered the way the one before it arrives.
+    pub on_arrival: SuccessCount,
+    /// Mean simulated time of those successes, seconds; infinite without any.
+    pub arrival_time_s: f64,
+}
+
+/// A policy composed of options, with its measured probability of success.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The problem.
+    pub query: Query,
+    /// `π_0`, the options, `π_{n+1}`.
+    pub steps: Vec<PlannedOption>,
+    /// Fresh runs through the whole plan, without recovery and without contact.
+    pub predicted: SuccessCount,
+    /// Mean simulated time of the successful ones, seconds; 0 without any.
+    pub predicted_time_s: f64,
+}
+
+impl Solution {
+    /// Option uses, and how many of them found their policy in the library.
+    #[must_use]
+    pub fn reuse(&self) -> (usize, usize) {
+        let options = self.steps.iter().filter(|step| step.option.id.role() == Role::Option);
+        options.fold((0, 0), |(uses, reused), step| (uses + 1, reused + usize::from(step.reused)))
+    }
+
+    pub(crate) fn estimate(&self) -> SuccessEstimate {
+        let mean_time_s = if self.predicted.successes == 0 { f64::INFINITY } else { self.predicted_time_s };
+        SuccessEstimate { count: self.predicted, mean_time_s }
+    }
+}
+
+/// The drivers of `plan`.
+pub(crate) fn drivers<'a>(plan: &[Arc<GuidedOption>], policies: &'a Policies<'_>) -> Vec<Driver<'a>> {
+    let driver = |(index, option): (usize, &Arc<GuidedOption>)| {
+        Driver::new(option, &policies.learnt(option.id).policy, plan.get(index + 1))
+    };
+    plan.iter().enumerate().map(driver).collect()
+}
+
+/// Runs `drivers` from the start of `problem`; `purpose` names the random stream.
+pub(crate) fn run_chain(
+    problem: &Problem<'_>,
+    drivers: &[Driver<'_>],
+    episodes: u32,
+    purpose: &str,
+) -> Vec<ChainRun> {
+    let trial = problem.conditions.monte_carlo(problem.world);
+    let trial = trial.with_episodes(episodes).with_seed(problem.seed.child(purpose, 0));
+    trial.runs(drivers, RobotState::at_rest(problem.query.start))
+}
+
+/// Counts how often `plan` succeeds.
+pub(crate) fn verify(problem: &Problem<'_>, plan: &[Arc<GuidedOption>], policies: &Policies<'_>) -> Solution {
+    let runs = run_chain(problem, &drivers(plan, policies), problem.method.verify_episodes, "verify");
+    let planned = |(index, option): (usize, &Arc<GuidedOption>)| {
+        let arrived = of_option(&runs, index);
+        PlannedOption {
+            option: Arc::clone(option),
+            learnt: policies.learnt(option.id).clone(),
+            reused: policies.is_reused(option.id),
+            on_arrival: arrived.count,
+            arrival_time_s: arrived.mean_time_s,
+        }
+    };
+    let SuccessEstimate { count, mean_time_s } = of_plan(&runs);
+    Solution {
+        query: problem.query,
+        steps: plan.iter().enumerate().map(planned).collect(),
+        predicted: count,
+        predicted_time_s: if mean_time_s.is_finite() { mean_time_s } else { 0.0 },
+    }
+}
+
+/// How often all options succeeded, and how long that took.
+pub(crate) fn of_plan(runs: &[ChainRun]) -> SuccessEstimate {
+    SuccessEstimate::of(runs.iter().map(|run| (run.end == EpisodeEnd::Reached, run.time_s())))
+}
+
+/// How often option number `index` succeeded where it was entered, and how long that took.
+pub(crate) fn of_option(runs: &[ChainRun], index: usize) -> SuccessEstimate {
+    let entered = runs.iter().filter(move |run| run.visits.len() > index);
+    SuccessEstimate::of(entered.map(|run| (run.passed(index), run.visits[index].time_s)))
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_drive::Visit;
+    use sharp_space::Pose;
+
+    use super::*;
+
+    #[test]
+    fn options_are_counted_only_where_they_were_entered() {
+        let arrival = RobotState::at_rest(Pose::new(0.0, 0.0, 0.0));
+        let run = |count, end| {
+            let visits = vec![Visit { entry: arrival, time_s: 1.0 }; count];
+            ChainRun { visits, arrival, end }
+        };
+        let runs = [run(2, EpisodeEnd::Reached), run(2, EpisodeEnd::Collided), run(1, EpisodeEnd::Lost)];
+        let counts = [0, 1].map(|index| of_option(&runs, index).count);
+        let count = |episodes, successes| SuccessCount { episodes, successes };
+        assert_eq!(counts, [count(3, 2), count(2, 1)]);
+        assert_eq!(of_option(&runs, 0).mean_time_s, 1.0);
+    }
+}
