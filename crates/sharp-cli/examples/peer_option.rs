@@ -149,10 +149,10 @@ fn learn(
     let mut failure = None;
     let clock = Clock::start();
     train(&mut tasks, &settings, &mut seed.stream("sac", 0), &mut |progress| {
-        effort = (progress.state.env_steps, progress.state.updates);
+        effort = (progress.env_steps, progress.updates);
         if effort.0 >= due {
             due += JUDGE_EVERY;
-            match judge(&mut judged, &progress.state.sac.actor, &mut judge_rng) {
+            match judge(&mut judged, progress.actor, &mut judge_rng) {
                 Ok(rate) => looks.push((effort.0, rate)),
                 Err(error) => failure = Some(error),
             }

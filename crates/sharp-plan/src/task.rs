@@ -108,7 +108,7 @@ impl Environment for LegTask {
 mod tests {
     use sharp_guide::{PseudoReward, ShapedReward};
     use sharp_options::OptionKind;
-    use sharp_rl::check_environment;
+    use sharp_rl::conformance::check_environment;
     use sharp_sim::RobotState;
 
     use super::*;

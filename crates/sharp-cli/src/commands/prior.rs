@@ -104,7 +104,8 @@ fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> 
     }
     let courses_s = begun.elapsed().as_secs_f64();
     let Some(trained) = learn(args, &courses, seed)? else { return Ok(Exit::Interrupted) };
-    write_atomic(&args.out, &Prior::new(trained.sac).to_bytes())?;
+    let networks = trained.sac.expect("soft actor-critic returns its networks");
+    write_atomic(&args.out, &Prior::new(networks).to_bytes())?;
     // Only now: a crash before would have lost both.
     let _ = std::fs::remove_file(checkpoint(args));
     let total = begun.elapsed().as_secs_f64();
@@ -150,15 +151,15 @@ fn learn(args: &PriorTrain, courses: &Arc<Vec<Course>>, seed: u64) -> Result<Opt
         if let Some(curves) = &mut curves {
             curves.note("prior", progress);
         }
-        bar.set_position(progress.state.env_steps);
+        bar.set_position(progress.env_steps);
         if let Some(evaluation) = progress.evaluation {
-            let (steps, rate) = (progress.state.env_steps, evaluation.success_rate());
+            let (steps, rate) = (progress.env_steps, evaluation.success_rate());
             bar.suspend(|| eprintln!("{steps} steps: {rate:.3}, {:.1} actions", evaluation.mean_steps));
         }
         if !progress::is_interrupted() {
             return ControlFlow::Continue(());
         }
-        interrupted = Some(progress.state.to_bytes());
+        interrupted = progress.checkpoint();
         ControlFlow::Break(())
     };
     let trained = match (read(&checkpoint(args))?, &args.from) {

@@ -132,7 +132,7 @@ pub fn train_settings() -> TrainSettings {
 #[cfg(test)]
 mod tests {
     use sharp_options::OptionKind;
-    use sharp_rl::{Environment, EnvironmentSpec, check_environment, evaluate};
+    use sharp_rl::{Environment, EnvironmentSpec, conformance::check_environment, evaluate};
     use sharp_space::Seed;
 
     use super::*;
