@@ -112,21 +112,21 @@ impl CurveFolder {
 mod tests {
     use std::ops::ControlFlow;
 
-    use sharp_rl::{SacSettings, StopRule, TrainSettings, toy, train};
+    use sharp_rl::{StopRule, TrainSettings, toy, train};
     use sharp_space::Seed;
 
     use super::*;
 
     fn note_training(folder: &mut CurveFolder, name: &str) {
-        let sac = SacSettings { hidden: vec![8], warmup_steps: 100, batch: 8, ..SacSettings::fast() };
-        let settings = TrainSettings {
-            sac,
-            max_env_steps: 2100,
-            evaluate_every: 1500,
-            evaluation_episodes: 2,
-            stop: StopRule::Never,
-            ..TrainSettings::fast()
-        };
+        let settings = TrainSettings::fast().with(|train| {
+            train.sac.hidden = vec![8];
+            train.sac.warmup_steps = 100;
+            train.sac.batch = 8;
+            train.max_env_steps = 2100;
+            train.evaluate_every = 1500;
+            train.evaluation_episodes = 2;
+            train.stop = StopRule::Never;
+        });
         let mut observer = |progress: &Progress<'_>| {
             folder.note(name, progress);
             ControlFlow::Continue(())

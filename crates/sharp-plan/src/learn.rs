@@ -6,9 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sharp_guide::{Place, PseudoReward, ShapedReward, StepEvents};
-use sharp_rl::{
-    Exploration, Progress, SacSettings, SacState, StopRule, TrainError, TrainSettings, fine_tune, train,
-};
+use sharp_rl::{Exploration, Progress, SacState, StopRule, TrainError, TrainSettings, fine_tune, train};
 use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, Vehicle};
 use sharp_space::{Pose, Seed};
 
@@ -77,20 +75,18 @@ impl LearnSettings {
                 certify_episodes: 1000,
                 environments: 16,
                 // Few steps: the prior drives already, and what it has not learnt then it hardly will.
-                train: TrainSettings {
-                    sac: SacSettings {
-                        learning_rate: 3e-4,
-                        updates_per_step: 0.25,
-                        warmup_steps: 1_000,
-                        exploration: Exploration::Policy,
-                        zero_last_actor_layer: false,
-                        ..prior::train_settings().sac
-                    },
-                    max_env_steps: 12_000,
-                    evaluate_every: 2_000,
-                    stop: StopRule::Success { rate: 0.995, episodes: 400 },
-                    ..TrainSettings::fast()
-                },
+                train: TrainSettings::fast().with(|train| {
+                    train.sac = prior::train_settings().sac.with(|sac| {
+                        sac.learning_rate = 3e-4;
+                        sac.updates_per_step = 0.25;
+                        sac.warmup_steps = 1_000;
+                        sac.exploration = Exploration::Policy;
+                        sac.zero_last_actor_layer = false;
+                    });
+                    train.max_env_steps = 12_000;
+                    train.evaluate_every = 2_000;
+                    train.stop = StopRule::Success { rate: 0.995, episodes: 400 };
+                }),
             },
             // Section 5: at most 150 k steps, 20 evaluation episodes each 10 k, one environment.
             LearningMode::Paper => Self {

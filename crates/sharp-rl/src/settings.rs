@@ -25,8 +25,11 @@ pub enum Exploration {
 }
 
 /// Hyperparameters of soft actor-critic.
+///
+/// Begin with a preset and change fields, in place or with [`SacSettings::with`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
 pub struct SacSettings {
     /// Widths of the hidden layers of actor and critics (paper: two of 256).
     pub hidden: Vec<usize>,
@@ -117,6 +120,13 @@ impl SacSettings {
             exploration: Exploration::Gaussian(0.4),
             ..Self::default()
         }
+    }
+
+    /// The same settings after `change`.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
     }
 
     /// Checks every range.

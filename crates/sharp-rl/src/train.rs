@@ -32,8 +32,11 @@ pub enum Normalisation {
 }
 
 /// Everything about a training run but its environments and its seed.
+///
+/// Begin with a preset and change fields, in place or with [`TrainSettings::with`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
 pub struct TrainSettings {
     /// Hyperparameters of soft actor-critic.
     pub sac: SacSettings,
@@ -77,6 +80,13 @@ impl TrainSettings {
             stop: StopRule::Success { rate: 0.99, episodes: 1_000 },
             ..Self::default()
         }
+    }
+
+    /// The same settings after `change`.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
     }
 }
 

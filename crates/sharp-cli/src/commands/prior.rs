@@ -12,7 +12,7 @@ use serde::Serialize;
 use sharp_options::{OptionKind, OptionSet};
 use sharp_plan::prior::{self, Course, CourseTask};
 use sharp_plan::{Abstraction, Follower, OptionPolicy, PacedFollower, Prior, Query, Workspace, write_atomic};
-use sharp_rl::{Progress, TrainSettings, TrainState, Trained, fine_tune, resume, train};
+use sharp_rl::{Progress, TrainState, Trained, fine_tune, resume, train};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{GridFrame, OccupancyGrid, Pose, Seed, Stream};
@@ -137,7 +137,7 @@ fn checkpoint(args: &PriorTrain) -> PathBuf {
 /// Trains on `courses`, from a checkpoint where one was left; `None` if it was interrupted.
 fn learn(args: &PriorTrain, courses: &Arc<Vec<Course>>, seed: u64) -> Result<Option<Trained>, Failure> {
     let max_env_steps = args.steps.unwrap_or(prior::train_settings().max_env_steps);
-    let settings = TrainSettings { max_env_steps, ..prior::train_settings() };
+    let settings = prior::train_settings().with(|train| train.max_env_steps = max_env_steps);
     let noises = Arc::new(vec![NoiseModel::nominal(), NoiseModel::harsh(), NoiseModel::biased()]);
     let task = |index| {
         let seed = Seed(seed).child("environment", index);

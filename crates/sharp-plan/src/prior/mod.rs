@@ -9,7 +9,7 @@ mod course;
 
 use std::sync::LazyLock;
 
-use sharp_rl::{SacSettings, SacState, StopRule, StoreError, TrainSettings};
+use sharp_rl::{SacState, StopRule, StoreError, TrainSettings};
 use sharp_sim::{NoiseModel, RobotModel};
 
 use crate::percept::Expectation;
@@ -112,27 +112,23 @@ pub fn form(robot: &RobotModel, expectation: Expectation) -> Form {
 /// How a prior is trained.
 #[must_use]
 pub fn train_settings() -> TrainSettings {
-    TrainSettings {
-        sac: SacSettings {
-            hidden: vec![128, 128],
-            learning_rate: 5e-4,
-            updates_per_step: 0.25,
-            warmup_steps: 4_000,
-            zero_last_actor_layer: true,
-            ..SacSettings::fast()
-        },
-        max_env_steps: 600_000,
-        evaluate_every: 20_000,
-        evaluation_episodes: 800,
-        stop: StopRule::Never,
-        ..TrainSettings::fast()
-    }
+    TrainSettings::fast().with(|train| {
+        train.sac.hidden = vec![128, 128];
+        train.sac.learning_rate = 5e-4;
+        train.sac.updates_per_step = 0.25;
+        train.sac.warmup_steps = 4_000;
+        train.sac.zero_last_actor_layer = true;
+        train.max_env_steps = 600_000;
+        train.evaluate_every = 20_000;
+        train.evaluation_episodes = 800;
+        train.stop = StopRule::Never;
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use sharp_options::OptionKind;
-    use sharp_rl::{Environment, EnvironmentSpec, conformance::check_environment, evaluate};
+    use sharp_rl::{Environment, EnvironmentSpec, SacSettings, conformance::check_environment, evaluate};
     use sharp_space::Seed;
 
     use super::*;
