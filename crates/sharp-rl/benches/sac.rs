@@ -5,8 +5,8 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand::SeedableRng;
 use sharp_rl::{
-    Actor, ActorScratch, Batch, EnvironmentSpec, GradientBackend, ReplayBuffer, Sac, SacSettings, SacState,
-    SampleSettings, Stream, Transition,
+    Actor, ActorScratch, Batch, EnvironmentSpec, GradientBackend, ReplayBuffer, ReplayTransition, Sac,
+    SacSettings, SacState, SampleSettings, Stream,
 };
 
 /// Lengths like those of an option.
@@ -18,7 +18,7 @@ fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
     for _ in 0..10_000 {
         let mut draw = |len: usize| -> Vec<f32> { (0..len).map(|_| rng.random_range(-1.0..1.0)).collect() };
         let (observation, next_observation, action) = (draw(31), draw(31), draw(2));
-        buffer.push(Transition {
+        buffer.push(ReplayTransition {
             observation: &observation,
             action: &action,
             reward: observation[0] + action[1],

@@ -16,8 +16,8 @@ use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 use sharp_rl::toy::PointMass;
 use sharp_rl::{
-    Batch, EnvironmentSpec, Exploration, GradientBackend, ReplayBuffer, Sac, SacSettings, SacState,
-    SampleSettings, StopRule, Stream, TrainSettings, Transition, train,
+    Batch, EnvironmentSpec, Exploration, GradientBackend, ReplayBuffer, ReplayTransition, Sac, SacSettings,
+    SacState, SampleSettings, StopRule, Stream, TrainSettings, train,
 };
 
 /// The lengths of an option's vectors in the guide's frame.
@@ -89,7 +89,7 @@ fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
         let mut draw = |len: usize| -> Vec<f32> { (0..len).map(|_| rng.random_range(-1.0..1.0)).collect() };
         let (observation, next_observation) = (draw(SPEC.observation_len), draw(SPEC.observation_len));
         let action = draw(SPEC.action_len);
-        buffer.push(Transition {
+        buffer.push(ReplayTransition {
             observation: &observation,
             action: &action,
             reward: observation[0] + action[1],

@@ -10,7 +10,7 @@ use crate::normaliser::Normaliser;
 
 /// One transition over one or more steps, as borrowed vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transition<'a> {
+pub struct ReplayTransition<'a> {
     /// The first observation.
     pub observation: &'a [f32],
     /// The first action.
@@ -79,9 +79,9 @@ impl ReplayBuffer {
 
     /// The transition in `slot`, or `None` if it holds nothing yet.
     #[must_use]
-    pub fn get(&self, slot: usize) -> Option<Transition<'_>> {
+    pub fn get(&self, slot: usize) -> Option<ReplayTransition<'_>> {
         let EnvironmentSpec { observation_len, action_len } = self.spec;
-        (slot < self.len()).then(|| Transition {
+        (slot < self.len()).then(|| ReplayTransition {
             observation: row(&self.observations, slot, observation_len),
             action: row(&self.actions, slot, action_len),
             reward: self.rewards[slot],
@@ -96,7 +96,7 @@ impl ReplayBuffer {
     ///
     /// # Panics
     /// If a vector has another length than the buffer's.
-    pub fn push(&mut self, transition: Transition<'_>) {
+    pub fn push(&mut self, transition: ReplayTransition<'_>) {
         let EnvironmentSpec { observation_len, action_len } = self.spec;
         assert_eq!(transition.observation.len(), observation_len, "length of the observation");
         assert_eq!(transition.next_observation.len(), observation_len, "length of the next observation");
@@ -221,7 +221,7 @@ mod tests {
     const SPEC: EnvironmentSpec = EnvironmentSpec { observation_len: 1, action_len: 1 };
 
     fn push(buffer: &mut ReplayBuffer, value: f32, steps: u8, terminated: bool, truncated: bool) {
-        buffer.push(Transition {
+        buffer.push(ReplayTransition {
             observation: &[value],
             action: &[-value],
             reward: 10.0 * value,

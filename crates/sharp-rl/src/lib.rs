@@ -65,7 +65,7 @@ pub mod toy;
 
 pub use actor::{Actor, ActorError, ActorScratch};
 pub use adam::Adam;
-pub use buffer::{Batch, ReplayBuffer, SampleSettings, Transition};
+pub use buffer::{Batch, ReplayBuffer, ReplayTransition, SampleSettings};
 pub use environment::{Environment, EnvironmentSpec, ForkEnvironment, Step, Stream};
 pub use error::TrainError;
 pub use evaluation::{Evaluation, evaluate};

@@ -1,6 +1,6 @@
 //! n-step returns: sums rewards over several steps of one episode before a transition is stored.
 
-use crate::buffer::Transition;
+use crate::buffer::ReplayTransition;
 use crate::environment::{EnvironmentSpec, Step};
 
 /// The last steps of one episode, not yet stored.
@@ -35,13 +35,13 @@ impl NStep {
         action: &[f32],
         step: Step,
         next_observation: &[f32],
-        mut store: impl FnMut(Transition<'_>),
+        mut store: impl FnMut(ReplayTransition<'_>),
     ) {
         self.observations.extend_from_slice(observation);
         self.actions.extend_from_slice(action);
         self.rewards.push(step.reward);
         while self.rewards.len() == self.steps || (step.is_last() && !self.rewards.is_empty()) {
-            store(Transition {
+            store(ReplayTransition {
                 observation: &self.observations[..self.spec.observation_len],
                 action: &self.actions[..self.spec.action_len],
                 reward: self.rewards.iter().rev().fold(0.0, |sum, reward| reward + self.gamma * sum),

@@ -27,7 +27,7 @@ pub struct TrainState {
     /// The best networks so far; `None` before the first evaluation.
     pub best: Option<BestNetworks>,
     pub(crate) buffer: ReplayBuffer,
-    pub(crate) records: Vec<EpisodeRecord>,
+    pub(crate) records: Vec<ReplayRecord>,
     /// Draws the policy's actions.
     pub(crate) action_rng: Stream,
     /// Draws batches and their noise.
@@ -49,7 +49,7 @@ pub struct BestNetworks {
 
 /// The current episode of one environment: all that is needed to repeat it.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct EpisodeRecord {
+pub(crate) struct ReplayRecord {
     /// The stream before the reset of this episode; `None` before the first.
     pub(crate) start: Option<Stream>,
     /// The stream now.
@@ -70,7 +70,7 @@ impl TrainState {
         rng: &mut Stream,
     ) -> Self {
         let mut fork = || Stream::from_rng(rng);
-        let record = |stream| EpisodeRecord {
+        let record = |stream| ReplayRecord {
             start: None,
             stream,
             actions: Vec::new(),

@@ -8,7 +8,7 @@ use crate::buffer::ReplayBuffer;
 use crate::environment::{EnvironmentSpec, Stream};
 use crate::evaluation::Evaluation;
 use crate::sac_state::SacState;
-use crate::state::{BestNetworks, EpisodeRecord, TrainState};
+use crate::state::{BestNetworks, ReplayRecord, TrainState};
 use crate::store::{StoreError, TensorReader, TensorWriter};
 
 /// A stream as text: seed and position in 32-bit words.
@@ -120,7 +120,7 @@ impl TrainState {
             writer.vector(&format!("lane.{index}.actions"), &record.actions);
             writer.vector(&format!("lane.{index}.observation"), &record.observation);
         }
-        let episode = |record: &EpisodeRecord| EpisodeHeader {
+        let episode = |record: &ReplayRecord| EpisodeHeader {
             start: record.start.as_ref().map(StreamRecord::from),
             stream: (&record.stream).into(),
             action_values: record.actions.len(),
@@ -269,8 +269,8 @@ fn read_record(
     index: usize,
     header: EpisodeHeader,
     spec: EnvironmentSpec,
-) -> Result<EpisodeRecord, StoreError> {
-    Ok(EpisodeRecord {
+) -> Result<ReplayRecord, StoreError> {
+    Ok(ReplayRecord {
         start: header.start.map(Stream::from),
         stream: header.stream.into(),
         actions: reader.floats(&format!("lane.{index}.actions"), &[header.action_values])?,

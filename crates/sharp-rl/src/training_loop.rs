@@ -18,7 +18,7 @@ use crate::n_step::NStep;
 use crate::normaliser::Normaliser;
 use crate::sac::{Sac, UpdateReport};
 use crate::settings::{Exploration, SacSettings};
-use crate::state::{BestNetworks, EpisodeRecord, TrainState};
+use crate::state::{BestNetworks, ReplayRecord, TrainState};
 use crate::stop::{StopReason, StopRule};
 use crate::train::{Normalisation, TrainSettings};
 
@@ -197,7 +197,7 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
 
     /// Repeats the unfinished episode of a saved state.
     fn replay(&mut self, index: usize) -> Result<(), TrainError> {
-        let EpisodeRecord { start, stream, actions, observation: saved } = &self.state.records[index];
+        let ReplayRecord { start, stream, actions, observation: saved } = &self.state.records[index];
         let Some(mut replayed) = start.clone() else { return Ok(()) };
         let mut observation = vec![0.0; saved.len()];
         self.environments[index].reset(&mut replayed, &mut observation);

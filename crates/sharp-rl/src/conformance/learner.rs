@@ -134,8 +134,8 @@ fn check_errors(learner: &dyn Learner, rng: &Stream) -> Result<(), LearnerViolat
         ("no environments", vec![]),
         ("an environment without components", vec![CountedIdentity::new(0)]),
         ("environments of different lengths", vec![CountedIdentity::new(1), CountedIdentity::new(2)]),
-        ("an observation that is NaN", vec![faulty(Fault::Observation)]),
-        ("a reward that is infinite", vec![faulty(Fault::Reward)]),
+        ("an observation that is NaN", vec![faulty(IdentityFault::Observation)]),
+        ("a reward that is infinite", vec![faulty(IdentityFault::Reward)]),
     ];
     for (on, environments) in cases {
         let mut calls = 0_u64;
@@ -246,7 +246,7 @@ fn counted() -> (CountedIdentity, Arc<AtomicU64>) {
 
 /// What is not finite.
 #[derive(Clone, Copy, Debug)]
-enum Fault {
+enum IdentityFault {
     Observation,
     Reward,
 }
@@ -256,7 +256,7 @@ enum Fault {
 struct CountedIdentity {
     inner: Identity,
     steps: Arc<AtomicU64>,
-    fault: Option<Fault>,
+    fault: Option<IdentityFault>,
 }
 
 impl CountedIdentity {
@@ -278,8 +278,8 @@ impl Environment for CountedIdentity {
         self.steps.fetch_add(1, Ordering::Relaxed);
         let mut step = self.inner.step(action, observation);
         match self.fault {
-            Some(Fault::Observation) => observation[0] = f32::NAN,
-            Some(Fault::Reward) => step.reward = f32::INFINITY,
+            Some(IdentityFault::Observation) => observation[0] = f32::NAN,
+            Some(IdentityFault::Reward) => step.reward = f32::INFINITY,
             None => {}
         }
         step
