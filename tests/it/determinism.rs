@@ -11,7 +11,7 @@ use sharp_plan::{
     OptionPolicy, Outcome, Percept, Plan, Query, Solution, SolveSettings, StoredOption, Tracker, map_hash,
     solve,
 };
-use sharp_rl::{SacSettings, StopRule, TrainSettings};
+use sharp_rl::{StopRule, TrainSettings};
 use sharp_sim::{NoiseModel, RobotModel, RobotState};
 use sharp_space::{Pose, Seed, Vector};
 use tempfile::TempDir;
@@ -25,15 +25,14 @@ fn across() -> Query {
 
 /// The paper's protocol with a budget that only shows that it runs: nothing good is learnt.
 fn tiny_paper(world: &World, seed: u64) -> SolveSettings {
-    let sac = SacSettings { hidden: vec![16, 16], batch: 32, ..SacSettings::default() };
-    let train = TrainSettings {
-        sac,
-        max_env_steps: 600,
-        evaluate_every: 300,
-        evaluation_episodes: 2,
-        stop: StopRule::Never,
-        ..TrainSettings::default()
-    };
+    let train = TrainSettings::default().with(|train| {
+        train.sac.hidden = vec![16, 16];
+        train.sac.batch = 32;
+        train.max_env_steps = 600;
+        train.evaluate_every = 300;
+        train.evaluation_episodes = 2;
+        train.stop = StopRule::Never;
+    });
     let learn = LearnSettings {
         screening_episodes: 4,
         certify_episodes: 20,

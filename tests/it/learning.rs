@@ -8,7 +8,7 @@ use sharp_plan::{
     Follower, LearnSettings, LearningMode, Leg, Lesson, OptionPolicy, Planner, Query, Role, Rule,
     SearchSettings, StartSpread, Starts,
 };
-use sharp_rl::{SacSettings, StopRule, TrainSettings};
+use sharp_rl::{StopRule, TrainSettings};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{Pose, Seed};
 
@@ -26,15 +26,14 @@ fn easy_option(world: &World) -> Arc<Leg> {
 
 /// The paper's protocol with smaller networks, faster steps and a stop at 95 %.
 fn small_budget() -> LearnSettings {
-    let sac = SacSettings { hidden: vec![64, 64], learning_rate: 1e-3, ..SacSettings::default() };
-    let train = TrainSettings {
-        sac,
-        max_env_steps: 6000,
-        evaluate_every: 1000,
-        evaluation_episodes: 50,
-        stop: StopRule::Success { rate: 0.95, episodes: 100 },
-        ..TrainSettings::default()
-    };
+    let train = TrainSettings::default().with(|train| {
+        train.sac.hidden = vec![64, 64];
+        train.sac.learning_rate = 1e-3;
+        train.max_env_steps = 6000;
+        train.evaluate_every = 1000;
+        train.evaluation_episodes = 50;
+        train.stop = StopRule::Success { rate: 0.95, episodes: 100 };
+    });
     LearnSettings { train, certify_episodes: 200, ..LearnSettings::new(LearningMode::Paper) }
 }
 

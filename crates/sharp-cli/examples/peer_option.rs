@@ -24,7 +24,7 @@ use sharp_plan::{
     StartSpread, Starts, prior,
 };
 use sharp_rl::{
-    Actor, Environment, Evaluation, SacSettings, StopRule, Stream, TrainError, TrainSettings, evaluate, train,
+    Actor, Environment, Evaluation, StopRule, Stream, TrainError, TrainSettings, evaluate, train,
 };
 use sharp_space::Seed;
 
@@ -105,8 +105,8 @@ impl Course {
             self.task(form, RewardMode::Shaped(ShapedReward::default()), seed.child(name, index))
         };
         let tasks = (0..16).map(|index| task("environment", index)).collect();
-        let sac = SacSettings { zero_last_actor_layer: true, ..SacSettings::fast() };
-        learn(tasks, task("judge", 0), TrainSettings { sac, ..TrainSettings::fast() }, seed, limit_s)
+        let settings = TrainSettings::fast().with(|train| train.sac.zero_last_actor_layer = true);
+        learn(tasks, task("judge", 0), settings, seed, limit_s)
     }
 
     /// What a plan does for the option: candidates, certificates, training where none suffices.
@@ -138,21 +138,20 @@ fn learn(
     limit_s: f64,
 ) -> Result<Value, TrainError> {
     // The judge outside takes the place of the evaluations inside.
-    let settings = TrainSettings {
-        evaluate_every: u64::MAX / 2,
-        evaluation_episodes: 1,
-        stop: StopRule::Never,
-        ..settings
-    };
+    let settings = settings.with(|train| {
+        train.evaluate_every = u64::MAX / 2;
+        train.evaluation_episodes = 1;
+        train.stop = StopRule::Never;
+    });
     let (mut judged, mut judge_rng) = ([judged], seed.stream("judge", 0));
     let (mut looks, mut due, mut effort) = (Vec::new(), JUDGE_EVERY, (0, 0));
     let mut failure = None;
     let clock = Clock::start();
     train(&mut tasks, &settings, &mut seed.stream("sac", 0), &mut |progress| {
-        effort = (progress.state.env_steps, progress.state.updates);
+        effort = (progress.env_steps, progress.updates);
         if effort.0 >= due {
             due += JUDGE_EVERY;
-            match judge(&mut judged, &progress.state.sac.actor, &mut judge_rng) {
+            match judge(&mut judged, progress.actor, &mut judge_rng) {
                 Ok(rate) => looks.push((effort.0, rate)),
                 Err(error) => failure = Some(error),
             }

@@ -31,7 +31,7 @@ impl Curves {
 
     /// Notes a step of training; writes when a point is due, and after every evaluation.
     pub(crate) fn note(&mut self, progress: &Progress<'_>) -> io::Result<()> {
-        let steps = progress.state.env_steps;
+        let steps = progress.env_steps;
         let first = *self.first.get_or_insert(steps);
         let is_due = steps / EVERY_STEPS > self.last / EVERY_STEPS || progress.evaluation.is_some();
         self.last = steps;
@@ -44,32 +44,26 @@ impl Curves {
 }
 
 /// Everything that is known at one step; what has no value yet is left out.
-fn scalars(progress: &Progress<'_>, fps: f64) -> Vec<(&'static str, f64)> {
-    let Progress { state, report, .. } = progress;
-    let mut values = vec![("time/fps", fps), ("time/total_timesteps", state.env_steps as f64)];
-    if state.episodes > 0 {
-        values.extend([
-            ("rollout/ep_rew_mean", progress.recent_return),
-            ("rollout/ep_len_mean", progress.recent_steps),
-            ("rollout/success_rate", progress.recent_success_rate),
-        ]);
+fn scalars(progress: &Progress<'_>, fps: f64) -> Vec<(String, f64)> {
+    let mut values = Vec::new();
+    let mut add = |name: &str, value| values.push((name.to_owned(), value));
+    add("time/fps", fps);
+    add("time/total_timesteps", progress.env_steps as f64);
+    if progress.episodes > 0 {
+        add("rollout/ep_rew_mean", progress.recent_return);
+        add("rollout/ep_len_mean", progress.recent_steps);
+        add("rollout/success_rate", progress.recent_success_rate);
     }
-    if state.updates > 0 {
-        values.extend([
-            ("train/actor_loss", f64::from(report.actor_loss)),
-            ("train/critic_loss", f64::from(report.critic_loss)),
-            ("train/ent_coef", f64::from(report.alpha)),
-            ("train/ent_coef_loss", f64::from(report.alpha_loss)),
-            ("train/learning_rate", f64::from(progress.learning_rate)),
-            ("train/n_updates", state.updates as f64),
-        ]);
+    for (name, value) in progress.metrics {
+        add(&format!("train/{name}"), *value);
+    }
+    if progress.updates > 0 {
+        add("train/n_updates", progress.updates as f64);
     }
     if let Some(evaluation) = progress.evaluation {
-        values.extend([
-            ("eval/mean_reward", evaluation.mean_return),
-            ("eval/mean_ep_length", evaluation.mean_steps),
-            ("eval/success_rate", evaluation.success_rate()),
-        ]);
+        add("eval/mean_reward", evaluation.mean_return);
+        add("eval/mean_ep_length", evaluation.mean_steps);
+        add("eval/success_rate", evaluation.success_rate());
     }
     values
 }
@@ -103,7 +97,7 @@ impl CurveFolder {
 
     fn try_note(&mut self, name: &str, progress: &Progress<'_>) -> io::Result<()> {
         // Fewer steps than before: it is trained a second time.
-        if self.running.get(name).is_none_or(|curves| progress.state.env_steps < curves.last) {
+        if self.running.get(name).is_none_or(|curves| progress.env_steps < curves.last) {
             let count = self.counts.entry(name.to_owned()).or_insert(0);
             *count += 1;
             let folder = if *count == 1 { name.to_owned() } else { format!("{name}-{count}") };
@@ -118,21 +112,21 @@ impl CurveFolder {
 mod tests {
     use std::ops::ControlFlow;
 
-    use sharp_rl::{SacSettings, StopRule, TrainSettings, toy, train};
+    use sharp_rl::{StopRule, TrainSettings, toy, train};
     use sharp_space::Seed;
 
     use super::*;
 
     fn note_training(folder: &mut CurveFolder, name: &str) {
-        let sac = SacSettings { hidden: vec![8], warmup_steps: 100, batch: 8, ..SacSettings::fast() };
-        let settings = TrainSettings {
-            sac,
-            max_env_steps: 2100,
-            evaluate_every: 1500,
-            evaluation_episodes: 2,
-            stop: StopRule::Never,
-            ..TrainSettings::fast()
-        };
+        let settings = TrainSettings::fast().with(|train| {
+            train.sac.hidden = vec![8];
+            train.sac.warmup_steps = 100;
+            train.sac.batch = 8;
+            train.max_env_steps = 2100;
+            train.evaluate_every = 1500;
+            train.evaluation_episodes = 2;
+            train.stop = StopRule::Never;
+        });
         let mut observer = |progress: &Progress<'_>| {
             folder.note(name, progress);
             ControlFlow::Continue(())

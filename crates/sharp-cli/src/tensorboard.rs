@@ -29,11 +29,11 @@ impl EventFile {
     }
 
     /// Adds numbers at `step`.
-    pub(crate) fn scalars(&mut self, step: u64, values: &[(&str, f64)]) -> io::Result<()> {
+    pub(crate) fn scalars<S: AsRef<str>>(&mut self, step: u64, values: &[(S, f64)]) -> io::Result<()> {
         let mut summary = Vec::new();
         for (tag, number) in values {
             let mut value = Vec::new();
-            put_bytes(&mut value, 1, tag.as_bytes());
+            put_bytes(&mut value, 1, tag.as_ref().as_bytes());
             put_key(&mut value, 2, Wire::Fixed32);
             value.extend((*number as f32).to_le_bytes());
             put_bytes(&mut summary, 1, &value);

@@ -157,7 +157,7 @@ impl RunningTask {
 #[cfg(test)]
 mod tests {
     use sharp_guide::{ProgressReward, PseudoReward};
-    use sharp_rl::check_environment;
+    use sharp_rl::conformance::check_environment;
     use sharp_sim::SimulatorKind;
 
     use super::*;

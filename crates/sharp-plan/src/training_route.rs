@@ -11,7 +11,7 @@ use sharp_drive::{
     ScenarioSource, StateSpread, SuccessEstimate, World, prior_interface,
 };
 use sharp_guide::{GuidedOption, LegId, ProgressReward};
-use sharp_rl::{SacSettings, StopRule, TrainSettings};
+use sharp_rl::{StopRule, TrainSettings};
 use sharp_sim::{NoiseModel, RobotState, SimulatorKind};
 use sharp_space::{Seed, Stream};
 
@@ -151,19 +151,15 @@ fn interface(world: &World, context: PolicyContext) -> PolicyInterface {
 /// How a prior is trained.
 #[must_use]
 pub fn prior_train_settings() -> TrainSettings {
-    TrainSettings {
-        sac: SacSettings {
-            hidden: vec![128, 128],
-            learning_rate: 5e-4,
-            updates_per_step: 0.25,
-            warmup_steps: 4_000,
-            zero_last_actor_layer: true,
-            ..SacSettings::fast()
-        },
-        max_env_steps: 600_000,
-        evaluate_every: 20_000,
-        evaluation_episodes: 800,
-        stop: StopRule::Never,
-        ..TrainSettings::fast()
-    }
+    TrainSettings::fast().with(|train| {
+        train.sac.hidden = vec![128, 128];
+        train.sac.learning_rate = 5e-4;
+        train.sac.updates_per_step = 0.25;
+        train.sac.warmup_steps = 4_000;
+        train.sac.zero_last_actor_layer = true;
+        train.max_env_steps = 600_000;
+        train.evaluate_every = 20_000;
+        train.evaluation_episodes = 800;
+        train.stop = StopRule::Never;
+    })
 }

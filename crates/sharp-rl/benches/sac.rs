@@ -1,13 +1,15 @@
-//! How long is one SAC update, by hand and through burn, and how long one decision?
+//! How long does one SAC update take, and how long one decision?
+//!
+//! The bench `backends` compares the two gradient backends.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand::SeedableRng;
 use sharp_rl::{
-    Actor, ActorScratch, Batch, EnvironmentSpec, LearnerKind, ReplayBuffer, Sac, SacSettings, SacState,
-    SampleSettings, Stream, Transition,
+    Actor, ActorScratch, Batch, EnvironmentSpec, GradientBackend, ReplayBuffer, ReplayTransition, Sac,
+    SacSettings, SacState, SampleSettings, Stream,
 };
 
-/// The size of the guide-frame observation and the polar waypoint.
+/// Lengths like those of an option.
 const SPEC: EnvironmentSpec = EnvironmentSpec { observation_len: 31, action_len: 2 };
 
 fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
@@ -16,7 +18,7 @@ fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
     for _ in 0..10_000 {
         let mut draw = |len: usize| -> Vec<f32> { (0..len).map(|_| rng.random_range(-1.0..1.0)).collect() };
         let (observation, next_observation, action) = (draw(31), draw(31), draw(2));
-        buffer.push(Transition {
+        buffer.push(ReplayTransition {
             observation: &observation,
             action: &action,
             reward: observation[0] + action[1],
@@ -31,21 +33,17 @@ fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
 
 fn sac_update(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sac_update");
-    for (width, kind) in [
-        (64, LearnerKind::Fused),
-        (64, LearnerKind::Burn),
-        (256, LearnerKind::Fused),
-        (256, LearnerKind::Burn),
-    ] {
-        let settings = SacSettings { hidden: vec![width, width], ..SacSettings::fast() };
+    for width in [64, 256] {
+        let mut settings = SacSettings::fast();
+        settings.hidden = vec![width, width];
         let mut rng = Stream::seed_from_u64(1);
         let buffer = filled_buffer(&mut rng);
         let mut state = SacState::new(SPEC, &settings, &mut rng);
         let normaliser = state.actor.normaliser().clone();
         let how = SampleSettings { gamma: 0.97, reward_scale: 1.0, normaliser: &normaliser };
         let mut batch = Batch::new(SPEC, settings.batch);
-        let mut sac = Sac::new(SPEC, &settings, kind);
-        group.bench_function(format!("{kind:?}/2x{width}/batch_256").to_lowercase(), |bencher| {
+        let mut sac = Sac::new(SPEC, &settings, GradientBackend::Fused);
+        group.bench_function(format!("fused/2x{width}/batch_256"), |bencher| {
             bencher.iter(|| {
                 buffer.sample(&how, &mut rng, &mut batch);
                 sac.update(&mut state, &batch)

@@ -1,8 +1,8 @@
 //! Our side of `cargo xtask bench peers learning`, as one JSON object on stdout.
 //!
-//! `peer_learning updates SECONDS` times gradient steps on a filled buffer, one learner alone and two
-//! at once, each on one thread; `peer_learning curve SEED` learns the point mass and prints the mean
-//! return of every evaluation.
+//! `peer_learning updates SECONDS` times gradient steps on a filled buffer, for one learner alone and
+//! for two at once, each on one thread. `peer_learning curve SEED` learns the point mass and prints
+//! the mean return of every evaluation.
 
 #![allow(
     clippy::disallowed_methods,
@@ -16,8 +16,8 @@ use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 use sharp_rl::toy::PointMass;
 use sharp_rl::{
-    Batch, EnvironmentSpec, Exploration, LearnerKind, ReplayBuffer, Sac, SacSettings, SacState,
-    SampleSettings, StopRule, Stream, TrainSettings, Transition, train,
+    Batch, EnvironmentSpec, Exploration, GradientBackend, ReplayBuffer, ReplayTransition, Sac, SacSettings,
+    SacState, SampleSettings, StopRule, Stream, TrainSettings, train,
 };
 
 /// The lengths of an option's vectors in the guide's frame.
@@ -25,7 +25,7 @@ const SPEC: EnvironmentSpec = EnvironmentSpec { observation_len: 51, action_len:
 /// Width of both hidden layers, and batch.
 const SIZES: [(usize, usize); 2] = [(256, 256), (64, 128)];
 const BUFFER: usize = 10_000;
-/// Gradient steps between two looks at the clock.
+/// Gradient steps between two readings of the clock.
 const CHUNK: u32 = 10;
 
 fn main() {
@@ -57,14 +57,15 @@ fn updates(time: Duration) -> Value {
 
 /// Gradient steps per second of one learner, drawing the batch included.
 fn rate(width: usize, batch: usize, seed: u64, time: Duration) -> f64 {
-    let settings = SacSettings { hidden: vec![width, width], batch, ..SacSettings::default() };
+    let mut settings = SacSettings::default();
+    (settings.hidden, settings.batch) = (vec![width, width], batch);
     let mut rng = Stream::seed_from_u64(seed);
     let buffer = filled_buffer(&mut rng);
     let mut state = SacState::new(SPEC, &settings, &mut rng);
     let normaliser = state.actor.normaliser().clone();
     let how = SampleSettings { gamma: settings.gamma, reward_scale: 1.0, normaliser: &normaliser };
     let (mut batch, mut sac) =
-        (Batch::new(SPEC, settings.batch), Sac::new(SPEC, &settings, LearnerKind::Fused));
+        (Batch::new(SPEC, settings.batch), Sac::new(SPEC, &settings, GradientBackend::Fused));
     let mut chunk = || {
         for _ in 0..CHUNK {
             buffer.sample(&how, &mut rng, &mut batch);
@@ -88,7 +89,7 @@ fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
         let mut draw = |len: usize| -> Vec<f32> { (0..len).map(|_| rng.random_range(-1.0..1.0)).collect() };
         let (observation, next_observation) = (draw(SPEC.observation_len), draw(SPEC.observation_len));
         let action = draw(SPEC.action_len);
-        buffer.push(Transition {
+        buffer.push(ReplayTransition {
             observation: &observation,
             action: &action,
             reward: observation[0] + action[1],
@@ -103,26 +104,21 @@ fn filled_buffer(rng: &mut Stream) -> ReplayBuffer {
 
 /// Learns the point mass: mean returns of 30 episodes every 250 steps, and the time it took.
 fn curve(seed: u64) -> Value {
-    let settings = TrainSettings {
-        sac: SacSettings {
-            hidden: vec![64, 64],
-            gamma: 0.97,
-            tau: 0.01,
-            learning_rate: 1e-3,
-            batch: 128,
-            buffer_capacity: BUFFER,
-            initial_alpha: 0.05,
-            target_entropy: Some(-2.0),
-            warmup_steps: 500,
-            exploration: Exploration::Uniform,
-            ..SacSettings::default()
-        },
-        max_env_steps: 1_500,
-        evaluate_every: 250,
-        evaluation_episodes: 30,
-        stop: StopRule::Never,
-        ..TrainSettings::default()
-    };
+    let mut settings = TrainSettings::default();
+    settings.sac.hidden = vec![64, 64];
+    settings.sac.gamma = 0.97;
+    settings.sac.tau = 0.01;
+    settings.sac.learning_rate = 1e-3;
+    settings.sac.batch = 128;
+    settings.sac.buffer_capacity = BUFFER;
+    settings.sac.initial_alpha = 0.05;
+    settings.sac.target_entropy = Some(-2.0);
+    settings.sac.warmup_steps = 500;
+    settings.sac.exploration = Exploration::Uniform;
+    settings.max_env_steps = 1_500;
+    settings.evaluate_every = 250;
+    settings.evaluation_episodes = 30;
+    settings.stop = StopRule::Never;
     let (mut steps, mut returns) = (Vec::new(), Vec::new());
     let mut rng = Stream::seed_from_u64(seed);
     let begun = Instant::now();

@@ -1,4 +1,4 @@
-//! The policy: a tanh-squashed diagonal Gaussian over actions in \[-1, 1\].
+//! The policy: a diagonal Gaussian squashed by tanh, over actions in \[-1, 1\].
 
 use std::f32::consts::{LN_2, TAU};
 
@@ -7,121 +7,23 @@ use rand_distr::StandardNormal;
 use thiserror::Error;
 
 use crate::environment::{EnvironmentSpec, Stream};
-use crate::network::{Mlp, Scratch};
+use crate::network::{Mlp, NetworkError, Scratch};
+use crate::normaliser::Normaliser;
 
 /// Bounds of the logarithm of a standard deviation (Stable-Baselines3).
 pub(crate) const LOG_STD_MIN: f32 = -20.0;
 pub(crate) const LOG_STD_MAX: f32 = 2.0;
 
-/// Scales observations to what the networks see: `(observation - mean) / std`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Normaliser {
-    mean: Vec<f32>,
-    std: Vec<f32>,
-}
-
-/// Why vectors make no normaliser.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum NormaliserError {
-    /// One mean for each deviation is needed.
-    #[error("{means} means for {deviations} deviations")]
-    Len {
-        /// Means given.
-        means: usize,
-        /// Deviations given.
-        deviations: usize,
-    },
-    /// Means are finite, deviations finite and positive.
-    #[error("component {component} has mean {mean} and deviation {std}")]
-    Value {
-        /// The component of the observation.
-        component: usize,
-        /// Its mean.
-        mean: f32,
-        /// Its deviation.
-        std: f32,
-    },
-}
-
-impl Normaliser {
-    /// A normaliser that changes nothing.
-    #[must_use]
-    pub fn identity(observation_len: usize) -> Self {
-        Self { mean: vec![0.0; observation_len], std: vec![1.0; observation_len] }
-    }
-
-    /// A normaliser from means and standard deviations.
-    ///
-    /// # Errors
-    /// If the lengths differ, a value is not finite, or a deviation is not positive.
-    pub fn new(mean: Vec<f32>, std: Vec<f32>) -> Result<Self, NormaliserError> {
-        if mean.len() != std.len() {
-            return Err(NormaliserError::Len { means: mean.len(), deviations: std.len() });
-        }
-        for (component, (&mean, &std)) in mean.iter().zip(&std).enumerate() {
-            if !(mean.is_finite() && std.is_finite() && std > 0.0) {
-                return Err(NormaliserError::Value { component, mean, std });
-            }
-        }
-        Ok(Self { mean, std })
-    }
-
-    /// Means and deviations of `observations`, laid end to end, each `observation_len` long.
-    ///
-    /// Components that never vary are only centred; a deviation is at least 1e-3 so that a value
-    /// seen once does not blow up.
-    #[must_use]
-    pub fn fit(observations: &[f32], observation_len: usize) -> Self {
-        let count = (observations.len() / observation_len).max(1) as f64;
-        let mut sums = vec![(0.0_f64, 0.0_f64); observation_len];
-        for observation in observations.chunks_exact(observation_len) {
-            for ((sum, squares), &value) in sums.iter_mut().zip(observation) {
-                *sum += f64::from(value);
-                *squares += f64::from(value) * f64::from(value);
-            }
-        }
-        let deviation = |sum: f64, squares: f64| {
-            let std = (squares / count - (sum / count).powi(2)).max(0.0).sqrt();
-            if std < 1e-6 { 1.0 } else { std.max(1e-3) }
-        };
-        Self {
-            mean: sums.iter().map(|(sum, _)| (sum / count) as f32).collect(),
-            std: sums.iter().map(|&(sum, squares)| deviation(sum, squares) as f32).collect(),
-        }
-    }
-
-    /// The means, one for each component.
-    #[must_use]
-    pub fn mean(&self) -> &[f32] {
-        &self.mean
-    }
-
-    /// The deviations, one for each component; positive.
-    #[must_use]
-    pub fn std(&self) -> &[f32] {
-        &self.std
-    }
-
-    /// Normalises observations laid end to end, in place.
-    pub fn apply(&self, observations: &mut [f32]) {
-        for observation in observations.chunks_exact_mut(self.mean.len()) {
-            for ((value, mean), std) in observation.iter_mut().zip(&self.mean).zip(&self.std) {
-                *value = (*value - mean) / std;
-            }
-        }
-    }
-}
-
-/// A policy ready for use: network and normaliser.
+/// A policy ready for use: a network and the normaliser of its observations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Actor {
     network: Mlp,
     normaliser: Normaliser,
 }
 
-/// Why a network and a normaliser make no actor.
+/// Why a network and a normaliser do not make an actor.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 #[error(
     "network sizes {sizes:?} do not fit a normaliser of {normaliser_len} components and pairs of outputs"
 )]
@@ -150,8 +52,8 @@ impl Actor {
     pub fn from_parts(network: Mlp, normaliser: Normaliser) -> Result<Self, ActorError> {
         let sizes = network.sizes();
         let outputs = sizes[sizes.len() - 1];
-        if sizes[0] != normaliser.mean.len() || !outputs.is_multiple_of(2) {
-            return Err(ActorError { sizes: sizes.to_vec(), normaliser_len: normaliser.mean.len() });
+        if sizes[0] != normaliser.mean().len() || !outputs.is_multiple_of(2) {
+            return Err(ActorError { sizes: sizes.to_vec(), normaliser_len: normaliser.mean().len() });
         }
         Ok(Self { network, normaliser })
     }
@@ -163,18 +65,32 @@ impl Actor {
         EnvironmentSpec { observation_len: sizes[0], action_len: sizes[sizes.len() - 1] / 2 }
     }
 
+    /// All weights and biases of the network, in one vector (see [`Mlp::parameters`]).
+    #[must_use]
+    pub fn parameters(&self) -> &[f32] {
+        self.network.parameters()
+    }
+
+    /// Replaces all weights and biases of the network.
+    ///
+    /// # Errors
+    /// If there are more or fewer than [`Self::parameters`] has, or if one is not finite.
+    pub fn set_parameters(&mut self, parameters: &[f32]) -> Result<(), NetworkError> {
+        self.network.set_parameters(parameters)
+    }
+
     /// The network behind the policy.
     #[must_use]
     pub const fn network(&self) -> &Mlp {
         &self.network
     }
 
-    /// The network behind the policy, to be trained.
+    /// The network behind the policy, for training.
     pub const fn network_mut(&mut self) -> &mut Mlp {
         &mut self.network
     }
 
-    /// What observations pass through first.
+    /// The scaling of observations before the network.
     #[must_use]
     pub const fn normaliser(&self) -> &Normaliser {
         &self.normaliser
@@ -185,14 +101,14 @@ impl Actor {
     /// # Panics
     /// If it has another length.
     pub fn set_normaliser(&mut self, normaliser: Normaliser) {
-        assert_eq!(normaliser.mean.len(), self.normaliser.mean.len(), "length of the normaliser");
+        assert_eq!(normaliser.mean().len(), self.normaliser.mean().len(), "length of the normaliser");
         self.normaliser = normaliser;
     }
 
-    /// Writes the most likely action, tanh of the mean: the deployed, deterministic policy.
+    /// Writes tanh of the mean, the action of the deployed, deterministic policy.
     ///
     /// # Panics
-    /// If `observation` or `action` has a length other than [`Self::spec`] says.
+    /// If `observation` or `action` has another length than [`Self::spec`].
     pub fn act_mean(&self, observation: &[f32], scratch: &mut ActorScratch, action: &mut [f32]) {
         let outputs = self.outputs(observation, scratch, action.len());
         for (action, mean) in action.iter_mut().zip(outputs) {
@@ -200,10 +116,10 @@ impl Actor {
         }
     }
 
-    /// Draws an action, as training does.
+    /// Draws an action from the policy, as training does.
     ///
     /// # Panics
-    /// If `observation` or `action` has a length other than [`Self::spec`] says.
+    /// If `observation` or `action` has another length than [`Self::spec`].
     pub fn act_sample(
         &self,
         observation: &[f32],
@@ -233,16 +149,17 @@ impl Actor {
     }
 }
 
-/// Reused room for decisions.
+/// Buffers that decisions reuse.
 #[derive(Clone, Debug, Default)]
 pub struct ActorScratch {
     observation: Vec<f32>,
     network: Scratch,
 }
 
-/// Log density of one component at `u` before squashing: Gaussian minus the volume tanh removes.
+/// Log density of one component at `u`, its value before tanh.
 ///
-/// log(1 - tanh²u) is written as 2 (ln 2 - u - softplus(-2u)): exact where the square rounds to 1.
+/// It is the Gaussian's log density minus log(1 - tanh² u), the change of variables. The latter is
+/// written as 2 (ln 2 - u - softplus(-2u)), which is exact even where tanh² u rounds to 1.
 pub(crate) fn log_density(noise: f32, log_std: f32, u: f32) -> f32 {
     let softplus = (-2.0 * u).max(0.0) + (-2.0 * u.abs()).exp().ln_1p();
     -0.5 * (noise * noise + TAU.ln()) - log_std - 2.0 * (LN_2 - u - softplus)
@@ -286,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_surround_the_mean() {
+    fn half_of_the_samples_lie_above_the_mean() {
         let spec = EnvironmentSpec { observation_len: 3, action_len: 2 };
         let mut rng = Stream::seed_from_u64(1);
         let actor = Actor::new(spec, &[16], &mut rng);
@@ -299,24 +216,5 @@ mod tests {
             above += usize::from(action[0] > mean[0]);
         }
         assert!((430..570).contains(&above), "{above} of 1000 above the median");
-    }
-
-    #[test]
-    fn a_fitted_normaliser_centres_and_scales() {
-        let mut observations = vec![1.0, 5.0, 3.0, 5.0];
-        let normaliser = Normaliser::fit(&observations, 2);
-        assert_eq!(normaliser.mean(), [2.0, 5.0]);
-        assert_eq!(normaliser.std(), [1.0, 1.0], "a constant is only centred");
-        normaliser.apply(&mut observations);
-        assert_eq!(observations, [-1.0, 0.0, 1.0, 0.0]);
-    }
-
-    #[test]
-    fn a_broken_normaliser_is_refused() {
-        let refuse =
-            |mean: &[f32], std: &[f32]| Normaliser::new(mean.to_vec(), std.to_vec()).unwrap_err().to_string();
-        assert_eq!(refuse(&[0.0], &[]), "1 means for 0 deviations");
-        assert_eq!(refuse(&[0.0, 1.0], &[1.0, 0.0]), "component 1 has mean 1 and deviation 0");
-        assert_eq!(refuse(&[f32::NAN], &[1.0]), "component 0 has mean NaN and deviation 1");
     }
 }

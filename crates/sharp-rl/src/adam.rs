@@ -1,4 +1,4 @@
-//! The Adam optimiser (Kingma and Ba, 2015) over a parameter vector, one fused loop.
+//! The Adam optimiser (Kingma and Ba, 2015) over a parameter vector, as one loop.
 
 /// Moment estimates of one parameter vector.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +17,7 @@ const BETA_2: f32 = 0.999;
 const EPSILON: f32 = 1e-8;
 
 impl Adam {
-    /// Moments of `len` parameters that have not moved yet.
+    /// Moments of `len` parameters before the first step.
     #[must_use]
     pub fn new(len: usize) -> Self {
         Self { first: vec![0.0; len], second: vec![0.0; len], steps: 0 }
@@ -31,7 +31,7 @@ impl Adam {
         assert_eq!(parameters.len(), self.first.len(), "parameters of another network");
         assert_eq!(gradient.len(), self.first.len(), "gradient of another network");
         self.steps += 1;
-        let steps = self.steps.min(1 << 24) as i32; // Far beyond, both corrections are 1.
+        let steps = self.steps.min(1 << 24) as i32; // Long before, both corrections are 1.
         let step_size = learning_rate / (1.0 - f64::from(BETA_1).powi(steps)) as f32;
         let root_correction = (1.0 - f64::from(BETA_2).powi(steps)).sqrt().recip() as f32;
         let moments = self.first.iter_mut().zip(&mut self.second);

@@ -1,38 +1,38 @@
-//! Replay memory: a ring of transitions, sampled uniformly with our own generator.
+//! The replay buffer: a ring of transitions, sampled uniformly with the caller's generator.
 //!
-//! Ends inside the MDP and time limits are kept apart: targets bootstrap through the latter.
+//! Termination and truncation are kept apart: targets bootstrap after a truncation.
 
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use crate::actor::Normaliser;
 use crate::environment::{EnvironmentSpec, Stream};
+use crate::normaliser::Normaliser;
 
-/// One transition over one or more steps, borrowed from whoever records it.
+/// One transition over one or more steps, as borrowed vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transition<'a> {
-    /// Where it began.
+pub struct ReplayTransition<'a> {
+    /// The first observation.
     pub observation: &'a [f32],
     /// The first action.
     pub action: &'a [f32],
-    /// The discounted sum of the rewards on the way.
+    /// The discounted sum of the rewards of its steps.
     pub reward: f32,
     /// Steps from first to last observation, 1 to 255.
     pub steps: u8,
-    /// Where it led.
+    /// The last observation.
     pub next_observation: &'a [f32],
-    /// The episode ended there inside the MDP.
+    /// The episode terminated there.
     pub terminated: bool,
-    /// The episode was cut there from outside.
+    /// The episode was truncated there.
     pub truncated: bool,
 }
 
-/// A ring of transitions; when full, the oldest is overwritten.
+/// A ring of transitions. When it is full, the oldest is overwritten.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReplayBuffer {
     pub(crate) spec: EnvironmentSpec,
     pub(crate) capacity: usize,
-    /// The slot written next once the ring is full.
+    /// The slot that is written next.
     pub(crate) next: usize,
     pub(crate) observations: Vec<f32>,
     pub(crate) actions: Vec<f32>,
@@ -44,13 +44,13 @@ pub struct ReplayBuffer {
 }
 
 impl ReplayBuffer {
-    /// An empty ring; memory grows with what is stored, up to `capacity` transitions.
+    /// An empty buffer for `capacity` transitions. Its memory grows with what is stored.
     ///
     /// # Panics
     /// If `capacity` is zero.
     #[must_use]
     pub fn new(spec: EnvironmentSpec, capacity: usize) -> Self {
-        assert!(capacity > 0, "a replay buffer without room");
+        assert!(capacity > 0, "a replay buffer of capacity 0");
         Self {
             spec,
             capacity,
@@ -79,9 +79,9 @@ impl ReplayBuffer {
 
     /// The transition in `slot`, or `None` if it holds nothing yet.
     #[must_use]
-    pub fn get(&self, slot: usize) -> Option<Transition<'_>> {
+    pub fn get(&self, slot: usize) -> Option<ReplayTransition<'_>> {
         let EnvironmentSpec { observation_len, action_len } = self.spec;
-        (slot < self.len()).then(|| Transition {
+        (slot < self.len()).then(|| ReplayTransition {
             observation: row(&self.observations, slot, observation_len),
             action: row(&self.actions, slot, action_len),
             reward: self.rewards[slot],
@@ -92,11 +92,11 @@ impl ReplayBuffer {
         })
     }
 
-    /// Stores `transition`, over the oldest one if the ring is full.
+    /// Stores `transition`. A full buffer overwrites the oldest one.
     ///
     /// # Panics
     /// If a vector has another length than the buffer's.
-    pub fn push(&mut self, transition: Transition<'_>) {
+    pub fn push(&mut self, transition: ReplayTransition<'_>) {
         let EnvironmentSpec { observation_len, action_len } = self.spec;
         assert_eq!(transition.observation.len(), observation_len, "length of the observation");
         assert_eq!(transition.next_observation.len(), observation_len, "length of the next observation");
@@ -131,7 +131,7 @@ impl ReplayBuffer {
                 action_len,
             ));
             batch.rewards[index] = how.reward_scale * self.rewards[slot];
-            // Only a true end cuts the value off; `truncated` is deliberately not asked.
+            // Only a termination cuts the value off, so `truncated` does not matter here.
             batch.discounts[index] =
                 if self.terminated[slot] != 0 { 0.0 } else { how.gamma.powi(i32::from(self.steps[slot])) };
         }
@@ -150,13 +150,13 @@ pub struct SampleSettings<'a> {
     pub gamma: f32,
     /// Factor on rewards.
     pub reward_scale: f32,
-    /// What observations pass through.
+    /// The scaling of observations.
     pub normaliser: &'a Normaliser,
 }
 
-/// Transitions as the learner sees them, with the noise of its two policy samples.
+/// Transitions for one update, with the noise of its two policy samples.
 ///
-/// Because the noise is part of the batch, a learner draws nothing: equal batches, equal updates.
+/// Because the noise is part of the batch, an update draws nothing: equal batches give equal updates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Batch {
     /// Rows.
@@ -167,7 +167,7 @@ pub struct Batch {
     pub actions: Vec<f32>,
     /// Scaled, summed over the transition's steps.
     pub rewards: Vec<f32>,
-    /// Factor on the value of the next observation: γ to the number of steps, 0 after a true end.
+    /// Factor on the value of the next observation: γ to the number of steps, 0 after a termination.
     pub discounts: Vec<f32>,
     /// Batch x observation, normalised.
     pub next_observations: Vec<f32>,
@@ -178,7 +178,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Room for `len` transitions.
+    /// A batch of `len` transitions, all zero.
     #[must_use]
     pub fn new(spec: EnvironmentSpec, len: usize) -> Self {
         Self {
@@ -202,7 +202,7 @@ fn row_mut(data: &mut [f32], index: usize, len: usize) -> &mut [f32] {
     &mut data[index * len..][..len]
 }
 
-/// Writes `values` as row `slot`, which exists or is the first beyond the end.
+/// Writes `values` as row `slot`, which exists already or is the next one.
 fn put<T: Copy>(data: &mut Vec<T>, slot: usize, values: &[T]) {
     let start = slot * values.len();
     if start == data.len() {
@@ -221,7 +221,7 @@ mod tests {
     const SPEC: EnvironmentSpec = EnvironmentSpec { observation_len: 1, action_len: 1 };
 
     fn push(buffer: &mut ReplayBuffer, value: f32, steps: u8, terminated: bool, truncated: bool) {
-        buffer.push(Transition {
+        buffer.push(ReplayTransition {
             observation: &[value],
             action: &[-value],
             reward: 10.0 * value,
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_true_end_cuts_the_value_off() {
+    fn only_termination_cuts_the_value_off() {
         for (steps, terminated, truncated, discount) in
             [(1, false, false, 0.5), (1, false, true, 0.5), (3, false, true, 0.125), (3, true, false, 0.0)]
         {
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_ring_overwrites_the_oldest() {
+    fn a_full_buffer_overwrites_the_oldest() {
         let mut buffer = ReplayBuffer::new(SPEC, 3);
         for value in 0..5 {
             push(&mut buffer, value as f32, 1, false, false);

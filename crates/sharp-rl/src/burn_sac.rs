@@ -1,33 +1,29 @@
-//! The same losses through burn's autodiff: an independent check of the hand-written gradients.
+//! The losses of soft actor-critic through burn's autodiff: an independent check of [`FusedSac`].
+//!
+//! [`FusedSac`]: crate::fused::FusedSac
 
 use burn::prelude::{Device, Tensor, TensorData};
 use burn::tensor::activation::relu;
 
 use crate::actor::{Actor, LOG_STD_MAX, LOG_STD_MIN};
 use crate::buffer::Batch;
+use crate::gradients::{ActorLoss, CriticLoss, SacGradients};
 use crate::network::Mlp;
-use crate::sac::{ActorLoss, CriticLoss, Learner, SacState};
+use crate::sac_state::SacState;
 
-/// The [`Learner`] that differentiates with burn on its flex backend.
+/// [`SacGradients`] by burn's autodiff on its flex backend.
 ///
-/// Parameters cross over for each pass and gradients come back; noise and initial weights are the
-/// caller's, so burn's own generator is never used.
-#[derive(Clone, Debug)]
-pub struct BurnSac {
+/// Parameters are copied to burn for each pass and gradients are copied back. Noise and initial
+/// weights come from the caller, so burn's own generator is never used.
+#[derive(Debug)]
+pub(crate) struct BurnSac {
     plain: Device,
     tracked: Device,
 }
 
-impl Default for BurnSac {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl BurnSac {
-    /// A learner on the CPU.
-    #[must_use]
-    pub fn new() -> Self {
+    /// On the CPU.
+    pub(crate) fn new() -> Self {
         Self { plain: Device::flex(), tracked: Device::flex().autodiff() }
     }
 
@@ -36,7 +32,7 @@ impl BurnSac {
     }
 }
 
-impl Learner for BurnSac {
+impl SacGradients for BurnSac {
     fn targets(&mut self, state: &SacState, batch: &Batch, targets: &mut [f32]) {
         let next = self.tensor(&batch.next_observations, batch.len);
         let actor = BurnMlp::constant(state.actor.network(), &self.plain);
@@ -76,7 +72,7 @@ impl Learner for BurnSac {
         let actor = BurnMlp::tracked(state.actor.network(), &self.tracked);
         let policy = sample(&state.actor, &actor, observations.clone(), self.tensor(&batch.noise, batch.len));
         let inputs = Tensor::cat(vec![observations, policy.actions], 1);
-        // The critics are constants here: their weight gradients would be thrown away.
+        // The critics are constants here, because their weight gradients are not needed.
         let [first, second] =
             state.critics.each_ref().map(|q| BurnMlp::constant(q, &self.plain).forward(inputs.clone()));
         let loss = (policy.log_probabilities.clone() * state.alpha() - first.min_pair(second)).mean();
@@ -86,7 +82,7 @@ impl Learner for BurnSac {
     }
 }
 
-/// A network as tensors: (weights, outputs x inputs; bias, 1 x outputs) for each layer.
+/// A network as tensors. For each layer: weights (outputs x inputs) and bias (1 x outputs).
 struct BurnMlp(Vec<(Tensor<2>, Tensor<2>)>);
 
 impl BurnMlp {
@@ -127,26 +123,26 @@ impl BurnMlp {
     }
 }
 
-struct Policy {
+struct PolicyTensors {
     /// Batch x action.
     actions: Tensor<2>,
     /// Batch x 1.
     log_probabilities: Tensor<2>,
 }
 
-/// Draws actions at normalised observations; all formulas as in the hand-written version.
-fn sample(actor: &Actor, network: &BurnMlp, observations: Tensor<2>, noise: Tensor<2>) -> Policy {
+/// Draws actions at normalised observations, with the formulas of the hand-written version.
+fn sample(actor: &Actor, network: &BurnMlp, observations: Tensor<2>, noise: Tensor<2>) -> PolicyTensors {
     let action_len = actor.spec().action_len;
     let outputs = network.forward(observations);
     let means = outputs.clone().narrow(1, 0, action_len);
     let log_stds = outputs.narrow(1, action_len, action_len).clamp(LOG_STD_MIN, LOG_STD_MAX);
     let u = means + log_stds.clone().exp() * noise.clone();
-    // softplus(-2u), written so that it cannot overflow.
+    // softplus(-2u) in a form that cannot overflow.
     let softplus = relu(u.clone() * -2.0) + (u.clone().abs() * -2.0).exp().log1p();
     let squash = (u.clone() + softplus) * 2.0 - 2.0 * std::f32::consts::LN_2;
     let gauss = noise.square() * -0.5 - 0.5 * std::f32::consts::TAU.ln();
     let log_probabilities = (gauss - log_stds + squash).sum_dim(1);
-    Policy { actions: u.tanh(), log_probabilities }
+    PolicyTensors { actions: u.tanh(), log_probabilities }
 }
 
 fn matrix(data: &[f32], rows: usize, device: &Device) -> Tensor<2> {

@@ -1,20 +1,23 @@
-//! How good a policy is: episodes with its most likely actions, on streams of their own.
+//! How good a policy is: episodes of its deterministic form, each on a stream of its own.
 
 use rand::SeedableRng;
 use serde::{Deserialize, Serialize};
 
 use crate::actor::{Actor, ActorScratch};
-use crate::environment::{Environment, Stream};
-use crate::train::{EPISODE_LIMIT, TrainError, check_observation, check_reward};
+use crate::environment::{Environment, Step, Stream};
+use crate::error::{TrainError, check_observation, check_reward};
 
-/// The outcome of evaluation episodes.
+/// Steps after which an episode counts as endless: a time limit is the environment's duty.
+pub(crate) const EPISODE_LIMIT: u64 = 1_000_000;
+
+/// The result of evaluation episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     /// Episodes run.
     pub episodes: usize,
     /// Episodes in which a step reported success.
     pub successes: usize,
-    /// Mean undiscounted, unscaled return.
+    /// Mean return over the episodes, neither discounted nor scaled.
     pub mean_return: f64,
     /// Mean steps in an episode.
     pub mean_steps: f64,
@@ -25,13 +28,19 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    /// The share of successful episodes; 0 if there were none at all.
+    /// The share of successful episodes, 0 to 1; 0 if there were no episodes.
     #[must_use]
     pub fn success_rate(&self) -> f64 {
         if self.episodes == 0 { 0.0 } else { self.successes as f64 / self.episodes as f64 }
     }
 
-    /// Both samples of the same policy as one.
+    /// Environment steps of the evaluation itself, all episodes together.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        (self.mean_steps * self.episodes as f64).round() as u64
+    }
+
+    /// This evaluation and `other`, of the same policy, as one.
     #[must_use]
     pub fn pooled(&self, other: &Self) -> Self {
         let episodes = self.episodes + other.episodes;
@@ -47,7 +56,7 @@ impl Evaluation {
         }
     }
 
-    /// Returns true if this is the better policy: by success rate, then by mean return.
+    /// Returns true if this policy is better than `other`: by success rate, then by mean return.
     #[must_use]
     pub fn beats(&self, other: &Self) -> bool {
         let key = |evaluation: &Self| (evaluation.success_rate(), evaluation.mean_return);
@@ -57,14 +66,14 @@ impl Evaluation {
 
 /// Runs `episodes` episodes of the deterministic policy, on the environments in turn.
 ///
-/// Each episode has a stream of its own, forked from `rng`, so that none depends on the length of
+/// Each episode has a stream of its own, forked from `rng`. So no episode depends on the length of
 /// the one before.
 ///
 /// # Errors
-/// If an observation or reward is not finite, or an episode does not end.
+/// If an observation or a reward is not finite, or if an episode does not end.
 ///
 /// # Panics
-/// If there are no environments or their spec is not the actor's.
+/// If there are no environments, or if their spec is not the actor's.
 pub fn evaluate<E: Environment>(
     environments: &mut [E],
     actor: &Actor,
@@ -76,13 +85,13 @@ pub fn evaluate<E: Environment>(
     let mut result = Evaluation { episodes, ..Evaluation::default() };
     let (mut sum_return, mut sum_steps) = (0.0, 0_u64);
     let mut scratch = ActorScratch::default();
-    for index in 0..episodes {
+    for episode in 0..episodes {
         let mut stream = Stream::from_rng(rng);
-        let place = index % count;
-        let episode = run_episode(&mut environments[place], place, actor, &mut stream, &mut scratch)?;
-        sum_return += episode.total;
-        sum_steps += episode.steps;
-        result.successes += usize::from(episode.success);
+        let index = episode % count;
+        let sums = run_episode(&mut environments[index], index, actor, &mut stream, &mut scratch)?;
+        sum_return += sums.total;
+        sum_steps += sums.steps;
+        result.successes += usize::from(sums.success);
     }
     result.mean_return = sum_return / episodes.max(1) as f64;
     result.mean_steps = sum_steps as f64 / episodes.max(1) as f64;
@@ -90,38 +99,86 @@ pub fn evaluate<E: Environment>(
 }
 
 /// Sums over one episode.
-struct Episode {
-    total: f64,
-    steps: u64,
-    success: bool,
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct EpisodeSums {
+    pub(crate) steps: u64,
+    /// The return, neither discounted nor scaled.
+    pub(crate) total: f64,
+    /// A step reported success.
+    pub(crate) success: bool,
 }
 
+impl EpisodeSums {
+    pub(crate) fn add(&mut self, step: Step) {
+        self.steps += 1;
+        self.total += f64::from(step.reward);
+        self.success |= step.success;
+    }
+}
+
+/// Runs one episode; errors name the environment by its `index`.
 fn run_episode<E: Environment>(
     environment: &mut E,
     index: usize,
     actor: &Actor,
     rng: &mut Stream,
     scratch: &mut ActorScratch,
-) -> Result<Episode, TrainError> {
+) -> Result<EpisodeSums, TrainError> {
     let spec = environment.spec();
     assert_eq!(spec, actor.spec(), "lengths of environment {index} and of the actor");
     let (mut observation, mut action) = (vec![0.0; spec.observation_len], vec![0.0; spec.action_len]);
     environment.reset(rng, &mut observation);
     check_observation(&observation, index, 0)?;
-    let mut episode = Episode { total: 0.0, steps: 0, success: false };
+    let mut sums = EpisodeSums::default();
     loop {
         actor.act_mean(&observation, scratch, &mut action);
         let step = environment.step(&action, &mut observation);
-        episode.steps += 1;
-        check_reward(step.reward, index, episode.steps)?;
-        check_observation(&observation, index, episode.steps)?;
-        episode.total += f64::from(step.reward);
-        episode.success |= step.success;
+        sums.add(step);
+        check_reward(step.reward, index, sums.steps)?;
+        check_observation(&observation, index, sums.steps)?;
         if step.is_last() {
-            return Ok(episode);
+            return Ok(sums);
         }
-        if episode.steps >= EPISODE_LIMIT {
-            return Err(TrainError::Endless { environment: index, steps: episode.steps });
+        if sums.steps >= EPISODE_LIMIT {
+            return Err(TrainError::Endless { environment: index, steps: sums.steps });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::EnvironmentSpec;
+    use crate::toy::Identity;
+
+    fn evaluation(episodes: usize, successes: usize, mean_return: f64) -> Evaluation {
+        Evaluation { episodes, successes, mean_return, mean_steps: 4.0, ..Evaluation::default() }
+    }
+
+    #[test]
+    fn two_samples_are_weighted_by_their_episodes() {
+        let pooled = evaluation(10, 5, 1.0).pooled(&evaluation(30, 30, 5.0));
+        assert_eq!((pooled.episodes, pooled.successes, pooled.mean_return), (40, 35, 4.0));
+        assert_eq!(pooled.steps(), 160);
+    }
+
+    #[test]
+    fn success_counts_before_return() {
+        assert!(evaluation(10, 6, 0.0).beats(&evaluation(10, 5, 9.0)), "more successes");
+        assert!(evaluation(10, 5, 1.0).beats(&evaluation(10, 5, 0.0)), "a higher return");
+        assert!(!evaluation(10, 5, 1.0).beats(&evaluation(10, 5, 1.0)), "equal");
+    }
+
+    #[test]
+    fn equal_streams_give_equal_evaluations() {
+        let spec = EnvironmentSpec { observation_len: 2, action_len: 2 };
+        let actor = Actor::new(spec, &[8], &mut Stream::seed_from_u64(1));
+        let run = |seed| {
+            let mut environments = [Identity::new(2), Identity::new(2)];
+            evaluate(&mut environments, &actor, 5, &mut Stream::seed_from_u64(seed)).expect("evaluates")
+        };
+        assert_eq!(run(1), run(1));
+        assert_ne!(run(1), run(2));
+        assert_eq!(run(1).steps(), 50, "five episodes of ten steps");
     }
 }

@@ -1,34 +1,34 @@
-//! Hand-written passes of soft actor-critic: no allocation, nothing computed that is not used.
+//! Passes of soft actor-critic written by hand, without allocation.
 //!
-//! Against plain autodiff this saves the critics' weight gradients in the actor's pass and, there,
-//! sends each sample back only through the critic that was the smaller one.
+//! Compared with plain autodiff, the actor's pass saves two things: it computes no weight gradients
+//! of the critics, and each sample goes back only through the critic with the smaller value.
 
 use crate::actor::{Actor, LOG_STD_MAX, LOG_STD_MIN, layer_sizes, log_density};
 use crate::buffer::Batch;
 use crate::environment::EnvironmentSpec;
+use crate::gradients::{ActorLoss, CriticLoss, SacGradients};
 use crate::network::{InputSeed, Tape};
-use crate::sac::{ActorLoss, CriticLoss, Learner, SacState};
+use crate::sac_state::SacState;
 use crate::settings::SacSettings;
 
-/// The hand-written [`Learner`].
-#[derive(Clone, Debug)]
-pub struct FusedSac {
+/// [`SacGradients`] written by hand.
+#[derive(Debug)]
+pub(crate) struct FusedSac {
     spec: EnvironmentSpec,
     actor_tape: Tape,
     critic_tapes: [Tape; 2],
-    /// Batch x (observation, action): what critics see.
+    /// Batch x (observation, action): the input of the critics.
     inputs: Vec<f32>,
     policy: PolicySample,
     /// Batch x action: derivatives of min Q with respect to the action.
     action_gradient: Vec<f32>,
-    /// Rows where each critic is the smaller one.
+    /// For each critic, the rows where its value is the smaller one.
     rows: [Vec<usize>; 2],
 }
 
 impl FusedSac {
-    /// Room for batches and networks as `settings` describe them.
-    #[must_use]
-    pub fn new(spec: EnvironmentSpec, settings: &SacSettings) -> Self {
+    /// Buffers for batches and networks as `settings` describe them.
+    pub(crate) fn new(spec: EnvironmentSpec, settings: &SacSettings) -> Self {
         let EnvironmentSpec { observation_len, action_len } = spec;
         let batch = settings.batch;
         let actor_sizes = layer_sizes(observation_len, &settings.hidden, 2 * action_len);
@@ -47,7 +47,7 @@ impl FusedSac {
         }
     }
 
-    /// Draws actions at `observations` with the given noise and lays both out for the critics.
+    /// Draws actions at `observations` with the given noise and writes the input of the critics.
     fn sample_policy(&mut self, actor: &Actor, observations: &[f32], noise: &[f32]) {
         actor.network().forward(observations, &mut self.actor_tape);
         self.policy.draw(self.actor_tape.output(), noise, self.spec.action_len);
@@ -55,7 +55,7 @@ impl FusedSac {
     }
 }
 
-impl Learner for FusedSac {
+impl SacGradients for FusedSac {
     fn targets(&mut self, state: &SacState, batch: &Batch, targets: &mut [f32]) {
         self.sample_policy(&state.actor, &batch.next_observations, &batch.next_noise);
         for (critic, tape) in state.targets.iter().zip(&mut self.critic_tapes) {
@@ -113,7 +113,7 @@ impl Learner for FusedSac {
 }
 
 impl FusedSac {
-    /// Sorts the rows by the smaller critic; returns the sum of the smaller values.
+    /// Sorts the rows by the critic with the smaller value; returns the sum of the smaller values.
     fn choose_rows(&mut self) -> f32 {
         let [first, second] = self.critic_tapes.each_ref().map(Tape::output);
         self.rows.iter_mut().for_each(Vec::clear);
@@ -125,7 +125,7 @@ impl FusedSac {
 }
 
 /// Actions drawn from the policy and their log densities, one row for each observation.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct PolicySample {
     /// Batch x action.
     actions: Vec<f32>,
@@ -160,7 +160,7 @@ impl PolicySample {
     /// Derivatives of the loss with respect to means and log deviations.
     ///
     /// With u = μ + σ ε and a = tanh u: ∂L/∂u = (2 α a - ∂Q/∂a (1 - a²)) / B, which is also
-    /// ∂L/∂μ; ∂L/∂log σ = σ ε ∂L/∂u - α / B, and zero where log σ is clamped.
+    /// ∂L/∂μ. ∂L/∂log σ = σ ε ∂L/∂u - α / B, and zero where log σ is clamped.
     fn back(&self, outputs: &[f32], noise: &[f32], dq: &[f32], weights: LossWeights, delta: &mut [f32]) {
         let LossWeights { alpha, scale } = weights;
         let len = self.actions.len() / self.log_probabilities.len();
@@ -175,12 +175,12 @@ impl PolicySample {
     }
 }
 
-/// The smaller number; NaN if either is, where `f32::min` would hide it.
+/// The smaller number, or NaN if either is NaN. `f32::min` would hide a NaN.
 fn smaller(a: f32, b: f32) -> f32 {
     if a < b || a.is_nan() { a } else { b }
 }
 
-/// Lays observations and actions side by side.
+/// Writes each observation followed by its action into a row of `inputs`.
 fn join_rows(spec: EnvironmentSpec, observations: &[f32], actions: &[f32], inputs: &mut [f32]) {
     let rows = observations.chunks_exact(spec.observation_len).zip(actions.chunks_exact(spec.action_len));
     for (input, (observation, action)) in

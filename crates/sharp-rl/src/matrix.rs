@@ -1,33 +1,34 @@
 //! Products of row-major matrices over plain slices.
 //!
-//! Wide products go through nalgebra to matrixmultiply's packed kernels; transposes are strides,
-//! never copies. Layers with a narrow side (a critic's single output, a two-component observation)
-//! would fall into nalgebra's per-column path, so they are written out as dot products and sums.
+//! Wide products go through nalgebra to the packed kernels of matrixmultiply. A transpose is a
+//! stride, never a copy. For layers with a narrow side (a critic's single output, an observation of
+//! two components) nalgebra would work column by column, so they are written out as dot products
+//! and sums.
 
 use nalgebra::{DMatrixView, DMatrixViewMut, Dyn};
 
-/// Up to this width of the output a loop over contiguous rows beats packing for the kernel.
+/// Up to this width of the output, a loop over contiguous rows is faster than packing for the kernel.
 const NARROW_OUTPUTS: usize = 8;
-/// nalgebra leaves the packed kernel where a side is this short.
+/// Up to this length of a side, nalgebra does not use the packed kernel.
 const NARROW_INPUTS: usize = 5;
 
 /// The shape of a dense layer, or of a batch that passes through it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shape {
+pub(crate) struct LayerShape {
     pub(crate) batch: usize,
     pub(crate) inputs: usize,
     pub(crate) outputs: usize,
 }
 
-impl Shape {
+impl LayerShape {
     const fn is_narrow(self) -> bool {
         self.outputs <= NARROW_OUTPUTS || self.inputs <= NARROW_INPUTS || self.batch <= NARROW_INPUTS
     }
 }
 
 /// `y = x wᵀ`: x is batch x inputs, w outputs x inputs, y batch x outputs.
-pub(crate) fn multiply(shape: Shape, x: &[f32], w: &[f32], y: &mut [f32]) {
-    let Shape { batch, inputs, outputs } = shape;
+pub(crate) fn multiply(shape: LayerShape, x: &[f32], w: &[f32], y: &mut [f32]) {
+    let LayerShape { batch, inputs, outputs } = shape;
     if shape.is_narrow() {
         for (x, y) in x.chunks_exact(inputs).zip(y.chunks_exact_mut(outputs)) {
             matvec(w, x, y);
@@ -40,8 +41,8 @@ pub(crate) fn multiply(shape: Shape, x: &[f32], w: &[f32], y: &mut [f32]) {
 }
 
 /// `dx = dy w`: dy is batch x outputs, w outputs x inputs, dx batch x inputs.
-pub(crate) fn multiply_back(shape: Shape, dy: &[f32], w: &[f32], dx: &mut [f32]) {
-    let Shape { batch, inputs, outputs } = shape;
+pub(crate) fn multiply_back(shape: LayerShape, dy: &[f32], w: &[f32], dx: &mut [f32]) {
+    let LayerShape { batch, inputs, outputs } = shape;
     if shape.is_narrow() {
         for (dy, dx) in dy.chunks_exact(outputs).zip(dx.chunks_exact_mut(inputs)) {
             dx.fill(0.0);
@@ -57,8 +58,8 @@ pub(crate) fn multiply_back(shape: Shape, dy: &[f32], w: &[f32], dx: &mut [f32])
 }
 
 /// `dw = dyᵀ x`: dy is batch x outputs, x batch x inputs, dw outputs x inputs.
-pub(crate) fn multiply_weights(shape: Shape, dy: &[f32], x: &[f32], dw: &mut [f32]) {
-    let Shape { batch, inputs, outputs } = shape;
+pub(crate) fn multiply_weights(shape: LayerShape, dy: &[f32], x: &[f32], dw: &mut [f32]) {
+    let LayerShape { batch, inputs, outputs } = shape;
     if shape.is_narrow() {
         dw.fill(0.0);
         for (dy, x) in dy.chunks_exact(outputs).zip(x.chunks_exact(inputs)) {
@@ -80,7 +81,7 @@ pub(crate) fn matvec(w: &[f32], x: &[f32], y: &mut [f32]) {
     }
 }
 
-/// The dot product, summed in sixteen lanes: a fixed order that the compiler can vectorise.
+/// The dot product, summed in sixteen lanes. The order is fixed, and the compiler can vectorise it.
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     const LANES: usize = 16;
     let mut sums = [0.0_f32; LANES];
@@ -104,7 +105,7 @@ fn add_scaled(y: &mut [f32], scale: f32, x: &[f32]) {
 
 type View<'a> = DMatrixView<'a, f32, Dyn, Dyn>;
 
-/// A row-major matrix as it lies.
+/// A row-major matrix.
 fn rows(data: &[f32], rows: usize, cols: usize) -> View<'_> {
     View::from_slice_with_strides(data, rows, cols, cols, 1)
 }
@@ -136,7 +137,7 @@ mod tests {
 
     /// Compares all three products with the definition, element by element.
     fn check(batch: usize, inputs: usize, outputs: usize) {
-        let shape = Shape { batch, inputs, outputs };
+        let shape = LayerShape { batch, inputs, outputs };
         let (x, w, d) = (ramp(batch * inputs, 0.0), ramp(outputs * inputs, 1.0), ramp(batch * outputs, 2.0));
         let (mut y, mut dx, mut dw) =
             (vec![0.0; batch * outputs], vec![0.0; batch * inputs], vec![0.0; outputs * inputs]);

@@ -1,6 +1,6 @@
-//! Sums rewards over several steps before a transition is stored; never across an end.
+//! n-step returns: sums rewards over several steps of one episode before a transition is stored.
 
-use crate::buffer::Transition;
+use crate::buffer::ReplayTransition;
 use crate::environment::{EnvironmentSpec, Step};
 
 /// The last steps of one episode, not yet stored.
@@ -27,7 +27,7 @@ impl NStep {
 
     /// Records the `step` that `action` made from `observation` to `next_observation`.
     ///
-    /// `store` receives the transition that is now complete, and at the end of an episode all the
+    /// `store` receives the transition that is now complete. At the end of an episode it receives the
     /// shorter ones as well.
     pub fn push(
         &mut self,
@@ -35,13 +35,13 @@ impl NStep {
         action: &[f32],
         step: Step,
         next_observation: &[f32],
-        mut store: impl FnMut(Transition<'_>),
+        mut store: impl FnMut(ReplayTransition<'_>),
     ) {
         self.observations.extend_from_slice(observation);
         self.actions.extend_from_slice(action);
         self.rewards.push(step.reward);
         while self.rewards.len() == self.steps || (step.is_last() && !self.rewards.is_empty()) {
-            store(Transition {
+            store(ReplayTransition {
                 observation: &self.observations[..self.spec.observation_len],
                 action: &self.actions[..self.spec.action_len],
                 reward: self.rewards.iter().rev().fold(0.0, |sum, reward| reward + self.gamma * sum),
@@ -79,14 +79,14 @@ mod tests {
     }
 
     #[test]
-    fn one_step_stores_what_it_sees() {
+    fn a_window_of_one_step_stores_every_step() {
         let stored = returns(1, 3, Step::default());
         assert_eq!(stored, [(0.0, 1.0, 1, 1.0), (1.0, 2.0, 1, 2.0), (2.0, 4.0, 1, 3.0)]);
     }
 
     #[test]
-    fn three_steps_sum_by_hand_and_shorten_at_the_end() {
-        // γ = ½ and doubling rewards: every step adds its own first reward once more.
+    fn windows_of_three_steps_shorten_at_the_end() {
+        // With γ = ½ and doubling rewards, every further step adds the first reward once more.
         let expected = [(0.0, 3.0, 3, 3.0), (1.0, 6.0, 3, 4.0), (2.0, 8.0, 2, 4.0), (3.0, 8.0, 1, 4.0)];
         for last in
             [Step { terminated: true, ..Step::default() }, Step { truncated: true, ..Step::default() }]
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_episode_keeps_the_last_steps_back() {
+    fn the_last_steps_of_an_unfinished_episode_are_not_stored() {
         assert_eq!(returns(3, 4, Step::default()), [(0.0, 3.0, 3, 3.0), (1.0, 6.0, 3, 4.0)]);
     }
 

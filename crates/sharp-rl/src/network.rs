@@ -1,8 +1,8 @@
 //! Multilayer perceptrons with `ReLU` hidden layers, forward and backward, without allocation.
 //!
-//! All parameters of a network lie in one vector, layer after layer, weights (outputs x inputs,
-//! row-major, `PyTorch`'s layout) before biases, so optimiser, soft update and files are loops over
-//! slices. What a pass leaves behind for the backward pass is kept in a [`Tape`].
+//! All parameters of a network lie in one vector, layer after layer, weights before biases. Weights
+//! are outputs x inputs, row-major, `PyTorch`'s layout. So the optimiser, the soft update and files
+//! are loops over slices. A [`Tape`] keeps what the backward pass needs of the forward pass.
 
 use std::ops::Range;
 
@@ -10,9 +10,9 @@ use rand::RngExt;
 use thiserror::Error;
 
 use crate::environment::Stream;
-use crate::matrix::{Shape, dot, matvec, multiply, multiply_back, multiply_weights};
+use crate::matrix::{LayerShape, dot, matvec, multiply, multiply_back, multiply_weights};
 
-/// A fully connected network: `ReLU` after every layer but the last.
+/// A fully connected network, with `ReLU` after every layer but the last.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mlp {
     sizes: Vec<usize>,
@@ -28,7 +28,7 @@ pub struct Layer<'a> {
     pub bias: &'a [f32],
 }
 
-/// Why sizes and parameters make no network.
+/// Why sizes and parameters do not make a network.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NetworkError {
@@ -48,7 +48,7 @@ pub enum NetworkError {
     /// A parameter is NaN or infinite.
     #[error("parameter {index} is {value}")]
     NotFinite {
-        /// Its place in the vector.
+        /// Its index in the vector.
         index: usize,
         /// The value, as text so that the error can be compared.
         value: String,
@@ -71,25 +71,29 @@ impl Mlp {
         Self { sizes: sizes.to_vec(), parameters }
     }
 
-    /// A network from a parameter vector in the order described at the top of this module.
+    /// A network from one vector of all parameters, in the order of [`Self::parameters`].
     ///
     /// # Errors
-    /// If the sizes are no network, the vector does not fit them, or a value is not finite.
+    /// If the sizes do not describe a network, the vector does not fit them, or a value is not finite.
     pub fn from_parameters(sizes: &[usize], parameters: Vec<f32>) -> Result<Self, NetworkError> {
         if !is_network(sizes) {
             return Err(NetworkError::Sizes(sizes.to_vec()));
         }
-        let expected = parameter_count(sizes);
-        if parameters.len() != expected {
-            return Err(NetworkError::Len { sizes: sizes.to_vec(), found: parameters.len(), expected });
-        }
-        if let Some(index) = parameters.iter().position(|value| !value.is_finite()) {
-            return Err(NetworkError::NotFinite { index, value: parameters[index].to_string() });
-        }
+        check_parameters(sizes, &parameters)?;
         Ok(Self { sizes: sizes.to_vec(), parameters })
     }
 
-    /// Sets the last layer to zero, so that the network answers zero everywhere until it learns.
+    /// Replaces all parameters, in the order of [`Self::parameters`].
+    ///
+    /// # Errors
+    /// If the vector has another length than before, or if a value is not finite.
+    pub fn set_parameters(&mut self, parameters: &[f32]) -> Result<(), NetworkError> {
+        check_parameters(&self.sizes, parameters)?;
+        self.parameters.copy_from_slice(parameters);
+        Ok(())
+    }
+
+    /// Sets the last layer to zero, so that the output is zero everywhere until the network learns.
     pub fn zero_last_layer(&mut self) {
         let range = self.range(self.layer_count() - 1);
         self.parameters[range].fill(0.0);
@@ -107,18 +111,18 @@ impl Mlp {
         self.sizes.len() - 1
     }
 
-    /// All weights and biases.
+    /// All weights and biases, layer after layer: weights (outputs x inputs, row-major), then biases.
     #[must_use]
     pub fn parameters(&self) -> &[f32] {
         &self.parameters
     }
 
-    /// All weights and biases, to be changed.
+    /// All weights and biases, in the same order, for changes.
     pub fn parameters_mut(&mut self) -> &mut [f32] {
         &mut self.parameters
     }
 
-    /// The layer number `index`, 0 next to the input.
+    /// The layer with number `index`; layer 0 is next to the input.
     ///
     /// # Panics
     /// If there is no such layer.
@@ -129,7 +133,7 @@ impl Mlp {
         Layer { weights, bias }
     }
 
-    /// Moves every parameter by the share `tau` towards `online` (the soft update of targets).
+    /// Moves every parameter by the share `tau` towards `online`: the soft update of target networks.
     ///
     /// # Panics
     /// If the sizes differ.
@@ -140,7 +144,7 @@ impl Mlp {
         }
     }
 
-    /// Runs `input` (batch x inputs) and leaves every layer's values in `tape`.
+    /// Computes the outputs for `input` (batch x inputs) and keeps the values of every layer in `tape`.
     pub(crate) fn forward(&self, input: &[f32], tape: &mut Tape) {
         for index in 0..self.layer_count() {
             let shape = self.shape(index, tape.batch);
@@ -155,7 +159,7 @@ impl Mlp {
         }
     }
 
-    /// Turns the output derivatives in `tape` into derivatives of all parameters (overwritten).
+    /// Writes the derivatives of all parameters to `gradient`, from the output derivatives in `tape`.
     ///
     /// `input` and `tape` are those of the forward pass.
     pub(crate) fn backward(&self, input: &[f32], tape: &mut Tape, gradient: &mut [f32]) {
@@ -176,9 +180,9 @@ impl Mlp {
 
     /// The derivative of a single output with respect to some inputs, for some rows of the batch.
     ///
-    /// Row `r` of `out` (batch x `columns`) receives `scale` times the derivative for each `r` in
-    /// `rows`; other rows keep what they hold. Only the chosen rows are computed: of twin critics
-    /// each serves the samples where it is the smaller one.
+    /// Row `r` of `out` (batch x `columns`) receives `scale` times the derivative, for each `r` in
+    /// `rows`; other rows do not change. Only these rows are computed, because each of the twin
+    /// critics is needed only for the samples where its value is the smaller one.
     pub(crate) fn input_gradient(&self, tape: &mut Tape, rows: &[usize], seed: &InputSeed, out: &mut [f32]) {
         let last = self.layer_count() - 1;
         debug_assert!(last > 0 && self.sizes[last + 1] == 1, "one output above a hidden layer");
@@ -203,7 +207,7 @@ impl Mlp {
         self.gather_input_columns(tape, rows, &seed.columns, out);
     }
 
-    /// The last product of [`Self::input_gradient`]: first-layer deltas times the asked columns.
+    /// The last product of [`Self::input_gradient`]: deltas of the first layer times the columns asked for.
     fn gather_input_columns(&self, tape: &mut Tape, rows: &[usize], columns: &Range<usize>, out: &mut [f32]) {
         let (inputs, width) = (self.sizes[0], self.sizes[1]);
         let weights = self.layer(0).weights;
@@ -219,7 +223,7 @@ impl Mlp {
         }
     }
 
-    /// The output for one input vector; `scratch` grows once and is then reused.
+    /// The output for one input vector. `scratch` allocates once and is then reused.
     ///
     /// # Panics
     /// If `input` has another length than the first layer.
@@ -239,18 +243,18 @@ impl Mlp {
         &scratch.front[..self.sizes[self.layer_count()]]
     }
 
-    /// Where the layer lies in the parameter vector.
+    /// The part of the parameter vector that belongs to the layer.
     fn range(&self, index: usize) -> Range<usize> {
         let start = parameter_count(&self.sizes[..=index]);
         start..start + self.sizes[index + 1] * (self.sizes[index] + 1)
     }
 
-    fn shape(&self, index: usize, batch: usize) -> Shape {
-        Shape { batch, inputs: self.sizes[index], outputs: self.sizes[index + 1] }
+    fn shape(&self, index: usize, batch: usize) -> LayerShape {
+        LayerShape { batch, inputs: self.sizes[index], outputs: self.sizes[index + 1] }
     }
 }
 
-/// What [`Mlp::input_gradient`] starts from and what it is asked for.
+/// The start and the wanted columns of [`Mlp::input_gradient`].
 #[derive(Clone, Debug)]
 pub(crate) struct InputSeed {
     /// Derivative of the objective with respect to the output.
@@ -272,7 +276,7 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// Room for a network of `sizes` on `batch` rows.
+    /// Buffers for a network of `sizes` on `batch` rows.
     pub(crate) fn new(sizes: &[usize], batch: usize) -> Self {
         let room: Vec<_> = sizes[1..].iter().map(|width| vec![0.0; batch * width]).collect();
         Self { batch, values: room.clone(), deltas: room, columns: Vec::new() }
@@ -283,7 +287,7 @@ impl Tape {
         self.values.last().expect("a network has a layer")
     }
 
-    /// The network's output and room for its derivatives, both batch x outputs.
+    /// The network's output and the buffer of its derivatives, both batch x outputs.
     pub(crate) fn output_and_delta(&mut self) -> (&[f32], &mut [f32]) {
         (
             self.values.last().expect("a network has a layer"),
@@ -292,11 +296,22 @@ impl Tape {
     }
 }
 
-/// Reused room for [`Mlp::predict`].
+/// Buffers that [`Mlp::predict`] reuses.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     front: Vec<f32>,
     back: Vec<f32>,
+}
+
+fn check_parameters(sizes: &[usize], parameters: &[f32]) -> Result<(), NetworkError> {
+    let expected = parameter_count(sizes);
+    if parameters.len() != expected {
+        return Err(NetworkError::Len { sizes: sizes.to_vec(), found: parameters.len(), expected });
+    }
+    match parameters.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(NetworkError::NotFinite { index, value: parameters[index].to_string() }),
+        None => Ok(()),
+    }
 }
 
 fn is_network(sizes: &[usize]) -> bool {
@@ -313,7 +328,7 @@ fn add_bias(row: &mut [f32], bias: &[f32], hidden: bool) {
     if hidden {
         for (value, bias) in row.iter_mut().zip(bias) {
             let sum = *value + bias;
-            // Written so that NaN passes through: `f32::max` would turn it into a healthy zero.
+            // Written so that NaN passes through. `f32::max` would turn it into zero.
             *value = if sum < 0.0 { 0.0 } else { sum };
         }
     } else {
@@ -323,7 +338,7 @@ fn add_bias(row: &mut [f32], bias: &[f32], hidden: bool) {
     }
 }
 
-/// Stops derivatives where `ReLU` was flat.
+/// Sets derivatives to zero where `ReLU` was flat.
 fn mask(delta: &mut [f32], values: &[f32]) {
     for (delta, value) in delta.iter_mut().zip(values) {
         *delta = if *value > 0.0 { *delta } else { 0.0 };
@@ -421,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn one_vector_gives_what_the_batch_gives() {
+    fn one_vector_gives_the_output_of_the_batch() {
         let sizes = [31, 64, 64, 4];
         let network = Mlp::new(&sizes, &mut Stream::seed_from_u64(5));
         let input = ramp(BATCH * 31);
@@ -443,7 +458,7 @@ mod tests {
     }
 
     #[test]
-    fn the_soft_update_moves_by_its_share() {
+    fn the_soft_update_moves_by_tau() {
         let mut target = Mlp::from_parameters(&[1, 1], vec![0.0, 4.0]).expect("a network");
         let online = Mlp::from_parameters(&[1, 1], vec![1.0, 0.0]).expect("a network");
         target.move_towards(&online, 0.25);
@@ -451,14 +466,14 @@ mod tests {
     }
 
     #[test]
-    fn a_zeroed_last_layer_answers_zero() {
+    fn a_zeroed_last_layer_outputs_zero() {
         let mut network = Mlp::new(&[3, 8, 2], &mut Stream::seed_from_u64(7));
         network.zero_last_layer();
         assert_eq!(network.predict(&[1.0, -2.0, 3.0], &mut Scratch::default()), [0.0, 0.0]);
     }
 
     #[test]
-    fn parameters_that_make_no_network_are_refused() {
+    fn parameters_that_do_not_make_a_network_are_refused() {
         let refuse = |sizes: &[usize], parameters: Vec<f32>| {
             Mlp::from_parameters(sizes, parameters).expect_err("no network").to_string()
         };
@@ -466,5 +481,11 @@ mod tests {
         assert_eq!(refuse(&[3, 0], vec![]), "layer sizes [3, 0] describe no network");
         assert_eq!(refuse(&[1, 1], vec![0.0]), "1 parameters for layer sizes [1, 1], expected 2");
         assert_eq!(refuse(&[1, 1], vec![0.0, f32::NAN]), "parameter 1 is NaN");
+        let mut network = Mlp::from_parameters(&[1, 1], vec![1.0, 2.0]).expect("a network");
+        assert!(network.set_parameters(&[1.0]).is_err(), "too few");
+        assert!(network.set_parameters(&[1.0, f32::INFINITY]).is_err(), "not finite");
+        assert_eq!(network.parameters(), [1.0, 2.0], "unchanged after an error");
+        assert_eq!(network.set_parameters(&[3.0, 4.0]), Ok(()));
+        assert_eq!(network.parameters(), [3.0, 4.0]);
     }
 }

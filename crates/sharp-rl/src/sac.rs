@@ -1,130 +1,23 @@
-//! Soft actor-critic (Haarnoja et al. 2018, the learner of Sec. 4.3), independent of who
-//! differentiates.
+//! Soft actor-critic (Haarnoja et al. 2018), the algorithm of Sec. 4.3.
 //!
-//! [`Sac::update`] is the algorithm. What it asks of a [`Learner`], losses and their gradients,
-//! exists twice: hand-written ([`FusedSac`]) and through burn's autodiff ([`BurnSac`]). Everything
-//! that lasts is plain data in [`SacState`], so either may continue what the other began.
+//! [`Sac::update`] is one update, in the order of the paper. It takes losses and gradients from a
+//! [`GradientBackend`]. Everything that lasts is plain data in [`SacState`], so one backend can
+//! continue what the other began.
 
 use serde::{Deserialize, Serialize};
 
-use crate::actor::{Actor, layer_sizes};
-use crate::adam::Adam;
 use crate::buffer::Batch;
+#[cfg(any(feature = "burn", test))]
 use crate::burn_sac::BurnSac;
-use crate::environment::{EnvironmentSpec, Stream};
+use crate::environment::EnvironmentSpec;
 use crate::fused::FusedSac;
-use crate::network::Mlp;
+use crate::gradients::{GradientBackend, SacGradients};
+use crate::sac_state::SacState;
 use crate::settings::SacSettings;
 
-/// All that learning changes: networks, targets, temperature and optimiser moments.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SacState {
-    /// The policy π.
-    pub actor: Actor,
-    /// Twin critics Q₁, Q₂ over observation and action laid end to end.
-    pub critics: [Mlp; 2],
-    /// Their slow copies.
-    pub targets: [Mlp; 2],
-    /// Logarithm of the temperature α.
-    pub log_alpha: f32,
-    /// Moments of the actor.
-    pub actor_adam: Adam,
-    /// Moments of the critics.
-    pub critic_adams: [Adam; 2],
-    /// Moments of the temperature.
-    pub alpha_adam: Adam,
-}
-
-impl SacState {
-    /// Fresh networks.
-    #[must_use]
-    pub fn new(spec: EnvironmentSpec, settings: &SacSettings, rng: &mut Stream) -> Self {
-        let mut actor = Actor::new(spec, &settings.hidden, rng);
-        if settings.zero_last_actor_layer {
-            actor.network_mut().zero_last_layer();
-        }
-        let sizes = layer_sizes(spec.observation_len + spec.action_len, &settings.hidden, 1);
-        let critics = [Mlp::new(&sizes, rng), Mlp::new(&sizes, rng)];
-        let targets = critics.clone();
-        Self::assemble(actor, critics, targets, settings.initial_alpha.ln())
-    }
-
-    /// The same networks with fresh moments and temperature, as fine-tuning begins.
-    #[must_use]
-    pub fn restarted(&self, settings: &SacSettings) -> Self {
-        let (critics, targets) = (self.critics.clone(), self.targets.clone());
-        Self::assemble(self.actor.clone(), critics, targets, settings.initial_alpha.ln())
-    }
-
-    fn assemble(actor: Actor, critics: [Mlp; 2], targets: [Mlp; 2], log_alpha: f32) -> Self {
-        let actor_adam = Adam::new(actor.network().parameters().len());
-        let critic_adams = [0, 1].map(|i: usize| Adam::new(critics[i].parameters().len()));
-        Self { actor, critics, targets, log_alpha, actor_adam, critic_adams, alpha_adam: Adam::new(1) }
-    }
-
-    /// The temperature α.
-    #[must_use]
-    pub fn alpha(&self) -> f32 {
-        self.log_alpha.exp()
-    }
-
-    /// Returns true if no weight and not the temperature is NaN or infinite.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
-        let networks = [self.actor.network()].into_iter().chain(&self.critics).chain(&self.targets);
-        networks.flat_map(Mlp::parameters).all(|value| value.is_finite()) && self.log_alpha.is_finite()
-    }
-}
-
-/// Who computes losses and gradients.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LearnerKind {
-    /// The hand-written passes: the faster ones (see docs/algorithms/sac.md for how sure that is).
-    #[default]
-    Fused,
-    /// burn's autodiff on its flex backend.
-    Burn,
-}
-
-/// Losses of soft actor-critic and their gradients on one batch.
-pub trait Learner {
-    /// Writes the targets y = r + γⁿ (1 - end) (min Q̄(s', a') - α log π(a'|s')), one for each row.
-    fn targets(&mut self, state: &SacState, batch: &Batch, targets: &mut [f32]);
-
-    /// Writes the gradients of both critics' losses ½ mean (Q(s, a) - y)².
-    fn critic_gradients(
-        &mut self,
-        state: &SacState,
-        batch: &Batch,
-        targets: &[f32],
-        gradients: &mut [Vec<f32>; 2],
-    ) -> CriticLoss;
-
-    /// Writes the gradient of the actor's loss mean (α log π(a|s) - min Q(s, a)), a drawn anew.
-    fn actor_gradient(&mut self, state: &SacState, batch: &Batch, gradient: &mut [f32]) -> ActorLoss;
-}
-
-/// What a pass through the critics found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CriticLoss {
-    /// Sum of both losses.
-    pub loss: f32,
-    /// Mean of Q₁ over the batch.
-    pub mean_q: f32,
-}
-
-/// What a pass through the actor found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ActorLoss {
-    /// The loss.
-    pub loss: f32,
-    /// Mean of log π over the batch: minus the entropy.
-    pub mean_log_probability: f32,
-}
-
-/// Numbers of one update, for curves and for noticing trouble.
+/// Numbers of one update, for learning curves and to detect divergence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct UpdateReport {
     /// Sum of both critics' losses.
     pub critic_loss: f32,
@@ -141,7 +34,7 @@ pub struct UpdateReport {
 }
 
 impl UpdateReport {
-    /// The first number that is NaN or infinite, by name.
+    /// The name of the first number that is NaN or infinite.
     #[must_use]
     pub fn first_not_finite(&self) -> Option<&'static str> {
         let named = [
@@ -154,61 +47,62 @@ impl UpdateReport {
     }
 }
 
-/// The update, with its learner and reused room.
-#[allow(missing_debug_implementations, reason = "a learner is scratch space behind a trait object")]
+/// The update of soft actor-critic with the buffers that it reuses.
+#[allow(missing_debug_implementations, reason = "it holds buffers only; the state is in `SacState`")]
 pub struct Sac {
     tau: f32,
     learning_rate: f32,
     target_entropy: f32,
-    learner: Box<dyn Learner>,
+    gradients: Box<dyn SacGradients>,
     targets: Vec<f32>,
     critic_gradients: [Vec<f32>; 2],
     actor_gradient: Vec<f32>,
 }
 
 impl Sac {
-    /// Room for updates of networks as `settings` describe them.
+    /// Buffers for updates of networks as `settings` describe them.
     #[must_use]
-    pub fn new(spec: EnvironmentSpec, settings: &SacSettings, kind: LearnerKind) -> Self {
-        let learner: Box<dyn Learner> = match kind {
-            LearnerKind::Fused => Box::new(FusedSac::new(spec, settings)),
-            LearnerKind::Burn => Box::new(BurnSac::new()),
+    pub fn new(spec: EnvironmentSpec, settings: &SacSettings, backend: GradientBackend) -> Self {
+        let gradients: Box<dyn SacGradients> = match backend {
+            GradientBackend::Fused => Box::new(FusedSac::new(spec, settings)),
+            #[cfg(any(feature = "burn", test))]
+            GradientBackend::Burn => Box::new(BurnSac::new()),
         };
         Self {
             tau: settings.tau,
             learning_rate: settings.learning_rate,
             target_entropy: settings.target_entropy.unwrap_or(-(spec.action_len as f32)),
-            learner,
+            gradients,
             targets: vec![0.0; settings.batch],
             critic_gradients: [Vec::new(), Vec::new()],
             actor_gradient: Vec::new(),
         }
     }
 
-    /// One gradient step of critics, actor and temperature, in the paper's order.
+    /// One gradient step of critics, actor and temperature, in this order (Haarnoja et al. 2018).
     ///
     /// # Panics
-    /// If the batch or the networks have other sizes than the settings said.
+    /// If the batch or the networks have other sizes than the settings.
     pub fn update(&mut self, state: &mut SacState, batch: &Batch) -> UpdateReport {
         self.fit_gradients(state);
         // All losses below use the temperature from before this update.
 
         // y = r + γⁿ (1 - end) (min Q̄(s', a') - α log π(a'|s'))
-        self.learner.targets(state, batch, &mut self.targets);
+        self.gradients.targets(state, batch, &mut self.targets);
 
         // J(Q) = ½ mean (Q(s, a) - y)²
-        let critic = self.learner.critic_gradients(state, batch, &self.targets, &mut self.critic_gradients);
+        let critic = self.gradients.critic_gradients(state, batch, &self.targets, &mut self.critic_gradients);
         for (index, gradient) in self.critic_gradients.iter().enumerate() {
             let parameters = state.critics[index].parameters_mut();
             state.critic_adams[index].step(self.learning_rate, parameters, gradient);
         }
 
         // J(π) = mean (α log π(a|s) - min Q(s, a)), through the critics just updated
-        let actor = self.learner.actor_gradient(state, batch, &mut self.actor_gradient);
+        let actor = self.gradients.actor_gradient(state, batch, &mut self.actor_gradient);
         let parameters = state.actor.network_mut().parameters_mut();
         state.actor_adam.step(self.learning_rate, parameters, &self.actor_gradient);
 
-        // J(α) = -log α (mean log π + H̄): grows while the policy is less random than asked.
+        // J(α) = -log α (mean log π + H̄): α grows while the entropy is below its target H̄.
         let alpha_gradient = -(actor.mean_log_probability + self.target_entropy);
         let alpha_loss = state.log_alpha * alpha_gradient;
         let log_alpha = std::slice::from_mut(&mut state.log_alpha);
@@ -229,7 +123,7 @@ impl Sac {
         }
     }
 
-    /// Gives the gradients their lengths; allocates the first time only.
+    /// Gives the gradients their lengths. It allocates the first time only.
     fn fit_gradients(&mut self, state: &SacState) {
         self.actor_gradient.resize(state.actor.network().parameters().len(), 0.0);
         for (gradient, critic) in self.critic_gradients.iter_mut().zip(&state.critics) {
@@ -244,6 +138,8 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::*;
+    use crate::environment::Stream;
+    use crate::network::Mlp;
 
     const SPEC: EnvironmentSpec = EnvironmentSpec { observation_len: 7, action_len: 2 };
 
@@ -271,7 +167,7 @@ mod tests {
     fn fresh(seed: u64) -> (SacState, Batch) {
         let mut rng = Stream::seed_from_u64(seed);
         let mut state = SacState::new(SPEC, &settings(), &mut rng);
-        // Targets that differ from their critics show which of the two a pass used.
+        // Targets that differ from their critics show which of the two a pass reads.
         state.targets[0] = Mlp::new(state.critics[0].sizes(), &mut rng);
         (state, random_batch(&mut rng))
     }
@@ -284,14 +180,14 @@ mod tests {
         norm(&mut found.iter().zip(expected).map(|(a, b)| a - b)) / norm(&mut expected.iter().copied())
     }
 
-    fn gradients_of(learner: &mut dyn Learner, state: &SacState, batch: &Batch) -> [Vec<f32>; 4] {
+    fn gradients_of(backend: &mut dyn SacGradients, state: &SacState, batch: &Batch) -> [Vec<f32>; 4] {
         let mut targets = vec![0.0; batch.len];
-        learner.targets(state, batch, &mut targets);
+        backend.targets(state, batch, &mut targets);
         let critic = vec![0.0; state.critics[0].parameters().len()];
         let mut critics = [critic.clone(), critic];
-        learner.critic_gradients(state, batch, &targets, &mut critics);
+        backend.critic_gradients(state, batch, &targets, &mut critics);
         let mut actor = vec![0.0; state.actor.network().parameters().len()];
-        learner.actor_gradient(state, batch, &mut actor);
+        backend.actor_gradient(state, batch, &mut actor);
         let [first, second] = critics;
         [targets, first, second, actor]
     }
@@ -314,14 +210,14 @@ mod tests {
     #[test]
     fn the_actors_gradient_agrees_with_finite_differences() {
         let (mut state, batch) = fresh(9);
-        let mut learner = FusedSac::new(SPEC, &settings());
+        let mut backend = FusedSac::new(SPEC, &settings());
         let mut gradient = vec![0.0; state.actor.network().parameters().len()];
         let mut unused = gradient.clone();
-        learner.actor_gradient(&state, &batch, &mut gradient);
+        backend.actor_gradient(&state, &batch, &mut gradient);
         for index in (0..gradient.len()).step_by(11) {
             let mut shifted = |by: f32| {
                 state.actor.network_mut().parameters_mut()[index] += by;
-                f64::from(learner.actor_gradient(&state, &batch, &mut unused).loss)
+                f64::from(backend.actor_gradient(&state, &batch, &mut unused).loss)
             };
             let (high, low) = (shifted(4e-3), shifted(-8e-3));
             shifted(4e-3);
@@ -332,17 +228,17 @@ mod tests {
     }
 
     #[test]
-    fn fifty_updates_agree_between_both_learners() {
-        let run = |kind| {
+    fn fifty_updates_agree_between_both_backends() {
+        let run = |backend| {
             let mut rng = Stream::seed_from_u64(3);
             let mut state = SacState::new(SPEC, &settings(), &mut rng);
-            let mut sac = Sac::new(SPEC, &settings(), kind);
+            let mut sac = Sac::new(SPEC, &settings(), backend);
             for _ in 0..50 {
                 sac.update(&mut state, &random_batch(&mut rng));
             }
             state
         };
-        let (hand, burn) = (run(LearnerKind::Fused), run(LearnerKind::Burn));
+        let (hand, burn) = (run(GradientBackend::Fused), run(GradientBackend::Burn));
         let pairs = [
             ("actor", hand.actor.network(), burn.actor.network()),
             ("critic", &hand.critics[0], &burn.critics[0]),
@@ -358,13 +254,13 @@ mod tests {
     #[test]
     fn targets_bootstrap_unless_the_discount_is_zero() {
         let (state, mut batch) = fresh(4);
-        let mut learner = FusedSac::new(SPEC, &settings());
+        let mut backend = FusedSac::new(SPEC, &settings());
         let (mut whole, mut half, mut ended) = (vec![0.0; 48], vec![0.0; 48], vec![0.0; 48]);
         for (discount, targets) in [(1.0, &mut whole), (0.5, &mut half), (0.0, &mut ended)] {
             batch.discounts.fill(discount);
-            learner.targets(&state, &batch, targets);
+            backend.targets(&state, &batch, targets);
         }
-        assert_eq!(ended, batch.rewards, "no value after a true end");
+        assert_eq!(ended, batch.rewards, "no value after a termination");
         for row in 0..48 {
             let (full, part) = (whole[row] - ended[row], half[row] - ended[row]);
             assert!((full - 2.0 * part).abs() < 1e-5, "row {row}: {full} whole, {part} at half");
@@ -372,12 +268,12 @@ mod tests {
     }
 
     #[test]
-    fn the_temperature_follows_the_wanted_entropy() {
+    fn the_temperature_follows_the_target_entropy() {
         let alpha_after = |target_entropy| {
             let settings = SacSettings { target_entropy: Some(target_entropy), ..settings() };
             let mut rng = Stream::seed_from_u64(5);
             let mut state = SacState::new(SPEC, &settings, &mut rng);
-            let mut sac = Sac::new(SPEC, &settings, LearnerKind::Fused);
+            let mut sac = Sac::new(SPEC, &settings, GradientBackend::Fused);
             for _ in 0..20 {
                 sac.update(&mut state, &random_batch(&mut rng));
             }
@@ -399,7 +295,7 @@ mod tests {
             let (mut state, mut batch) = (state.clone(), batch.clone());
             batch.discounts.fill(0.97);
             spoil(&mut batch);
-            let mut sac = Sac::new(SPEC, &settings(), LearnerKind::Fused);
+            let mut sac = Sac::new(SPEC, &settings(), GradientBackend::Fused);
             let report = sac.update(&mut state, &batch);
             assert!(report.first_not_finite().is_some(), "case {case}: {report:?}");
         }

@@ -1,56 +1,63 @@
 //! Hyperparameters of soft actor-critic.
 //!
-//! [`SacSettings::default`] is the paper's setting: two layers of 256 (Sec. 5) and, where the
-//! paper is silent, the defaults of the Stable-Baselines3 it used. [`SacSettings::fast`] is tuned
-//! for options in the guide's frame on a CPU.
+//! [`SacSettings::default`] is the paper's setting: two hidden layers of 256 (Sec. 5). What the
+//! paper does not state is the default of Stable-Baselines3, which it used. [`SacSettings::fast`] is
+//! for small tasks on a CPU.
+
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// How actions are chosen before learning begins.
+/// How actions are chosen during the warm-up.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Exploration {
     /// Uniform over \[-1, 1\] (Stable-Baselines3).
     Uniform,
-    /// Normal around zero with this deviation, clipped to \[-1, 1\]: stays near a residual's base.
+    /// Normal around zero with this standard deviation, clipped to \[-1, 1\].
+    ///
+    /// For a policy that corrects a base policy, such actions stay near the base.
     Gaussian(f32),
-    /// The policy itself, for fine-tuning.
+    /// Drawn from the policy, for fine-tuning.
     Policy,
 }
 
 /// Hyperparameters of soft actor-critic.
+///
+/// Begin with a preset and change fields, in place or with [`SacSettings::with`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
 pub struct SacSettings {
     /// Widths of the hidden layers of actor and critics (paper: two of 256).
     pub hidden: Vec<usize>,
-    /// Discount per environment step, in (0, 1]. The paper's SSP has 1; SB3 learns with 0.99.
+    /// Discount γ per environment step, in (0, 1]. The paper's SSP has 1, SB3 learns with 0.99.
     pub gamma: f32,
-    /// Share by which the target critics follow the critics at each update, in (0, 1].
+    /// Share τ by which target critics follow the critics at each update, in (0, 1].
     pub tau: f32,
     /// Step size of Adam for actor, critics and temperature.
     pub learning_rate: f32,
     /// Transitions in a gradient step.
     pub batch: usize,
-    /// Transitions kept; the oldest are overwritten.
+    /// Transitions that the replay buffer keeps, at least a batch. The oldest are overwritten.
     pub buffer_capacity: usize,
-    /// The temperature α at the start; it is then adapted.
+    /// The temperature α at the start. It then adapts to the target entropy.
     pub initial_alpha: f32,
-    /// Entropy that α steers to, nats; `None` stands for minus the number of action components.
+    /// Target entropy H̄ of the policy, nats; `None` stands for minus the number of action components.
     pub target_entropy: Option<f32>,
     /// Gradient steps per environment step, any non-negative number (SB3: 1).
     pub updates_per_step: f32,
     /// Environment steps before the first gradient step (SB3's `learning_starts`).
     pub warmup_steps: u64,
-    /// How actions are chosen during these.
+    /// How actions are chosen during the warm-up.
     pub exploration: Exploration,
-    /// Rewards summed before a target bootstraps, 1 to 255; never across the end of an episode.
+    /// Steps of the n-step return, 1 to 255. It never reaches across the end of an episode.
     pub n_step: usize,
-    /// Factor on rewards inside the learner; reported returns stay unscaled.
+    /// Factor on rewards inside the learner. Reported returns are not scaled.
     pub reward_scale: f32,
-    /// Starts the actor's last layer at zero: a residual policy then begins as its base.
+    /// Sets the actor's last layer to zero at the start, so that a residual policy begins as its base.
     pub zero_last_actor_layer: bool,
 }
 
@@ -75,20 +82,29 @@ impl Default for SacSettings {
     }
 }
 
-/// A hyperparameter outside its range.
-#[derive(Clone, Debug, PartialEq, Error)]
+/// A setting outside its range.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 #[error("{name} is {value}, expected {expected}")]
 pub struct SettingsError {
     /// Name of the field.
     pub name: &'static str,
     /// Its value, as text.
     pub value: String,
-    /// What it should be.
+    /// Its range, in words.
     pub expected: &'static str,
 }
 
+impl SettingsError {
+    /// An error that names a field, its value and its range.
+    #[must_use]
+    pub fn new(name: &'static str, value: &dyn fmt::Debug, expected: &'static str) -> Self {
+        Self { name, value: format!("{value:?}"), expected }
+    }
+}
+
 impl SacSettings {
-    /// Small networks and few updates: one option in seconds rather than minutes.
+    /// Small networks and few updates: a small task takes seconds instead of minutes.
     #[must_use]
     pub fn fast() -> Self {
         Self {
@@ -106,6 +122,13 @@ impl SacSettings {
         }
     }
 
+    /// The same settings after `change`.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
+    }
+
     /// Checks every range.
     ///
     /// # Errors
@@ -113,8 +136,8 @@ impl SacSettings {
     pub fn validate(&self) -> Result<(), SettingsError> {
         let positive = |value: f32| value > 0.0 && value.is_finite();
         let share = |value: f32| value > 0.0 && value <= 1.0;
-        let check = |fits: bool, name, value: &dyn std::fmt::Debug, expected| {
-            if fits { Ok(()) } else { Err(SettingsError { name, value: format!("{value:?}"), expected }) }
+        let check = |fits: bool, name, value: &dyn fmt::Debug, expected| {
+            if fits { Ok(()) } else { Err(SettingsError::new(name, value, expected)) }
         };
         let widths = !self.hidden.is_empty() && !self.hidden.contains(&0);
         check(widths, "hidden", &self.hidden, "one positive width or more")?;
@@ -153,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_is_named() {
+    fn a_field_out_of_range_is_named() {
         let fast = SacSettings::fast;
         for (settings, message) in [
             (SacSettings { hidden: vec![], ..fast() }, "hidden is [], expected one positive width or more"),
@@ -169,6 +192,6 @@ mod tests {
             assert_eq!(settings.validate().expect_err(message).to_string(), message);
         }
         let json = r#"{"gama": 0.9}"#;
-        assert!(serde_json::from_str::<SacSettings>(json).is_err(), "a misspelt field is no default");
+        assert!(serde_json::from_str::<SacSettings>(json).is_err(), "a misspelt field is an error");
     }
 }

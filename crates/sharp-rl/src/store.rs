@@ -1,9 +1,9 @@
 //! Networks as safetensors bytes: weights as tensors, everything else as one JSON header.
 //!
-//! The header lies in the metadata under `sharp-rl`; a single key, because the format's metadata
-//! is an unordered map and equal contents are to give equal bytes. Weights carry `PyTorch`'s names
-//! and layout (`actor.0.weight`, outputs x inputs). Loading trusts nothing: version, kind, shapes
-//! and finiteness are checked.
+//! The header is in the metadata under `sharp-rl`. It is a single key, because the metadata of the
+//! format is an unordered map, and equal contents shall give equal bytes. Weights have `PyTorch`'s
+//! names and layout (`actor.0.weight`, outputs x inputs). Reading checks version, kind, shapes and
+//! that all values are finite.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,36 +13,37 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::actor::{Actor, ActorError, Normaliser, NormaliserError};
+use crate::actor::{Actor, ActorError};
 use crate::network::{Mlp, NetworkError};
+use crate::normaliser::{Normaliser, NormaliserError};
 
-/// Version of the layout; files of another version are refused.
+/// Version of the layout. Files of another version are refused.
 pub const FORMAT_VERSION: u32 = 1;
 
 const HEADER_KEY: &str = "sharp-rl";
 
-/// Why bytes are no stored network.
+/// Why bytes are not a stored network.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoreError {
-    /// Not a safetensors file, or a truncated one.
+    /// The bytes are not a safetensors file, or are truncated.
     #[error("no safetensors file: {0}")]
     Container(#[from] safetensors::SafeTensorError),
     /// The header is missing or malformed.
     #[error("broken header: {0}")]
     Header(String),
-    /// Written by another version.
+    /// The file has another format version.
     #[error("format version {found}, expected {FORMAT_VERSION}")]
     Version {
         /// The version found.
         found: u32,
     },
-    /// Another kind of content.
+    /// The file holds another kind of content.
     #[error("a file of kind {found:?}, expected {expected:?}")]
     Kind {
-        /// What the file says it is.
+        /// The kind of the file.
         found: String,
-        /// What was asked for.
+        /// The kind wanted.
         expected: &'static str,
     },
     /// A tensor has another type or shape than the header says.
@@ -60,18 +61,18 @@ pub enum StoreError {
     NotFinite {
         /// Its name.
         name: String,
-        /// The place in it.
+        /// The index in it.
         index: usize,
         /// The value.
         value: f32,
     },
-    /// The weights make no network.
+    /// The weights do not make a network.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// Network and normaliser do not fit.
+    /// Network and normaliser do not fit each other.
     #[error(transparent)]
     Actor(#[from] ActorError),
-    /// The normaliser is broken.
+    /// The values do not make a normaliser.
     #[error("normaliser: {0}")]
     Normaliser(#[from] NormaliserError),
 }
@@ -85,10 +86,10 @@ struct ActorHeader {
 impl Actor {
     const KIND: &'static str = "actor";
 
-    /// The actor as bytes of a safetensors file, with `notes` of the caller's choice.
+    /// The actor as bytes of a safetensors file, with free text `notes` of the caller.
     #[must_use]
     pub fn to_bytes(&self, notes: &BTreeMap<String, String>) -> Vec<u8> {
-        let mut writer = Writer::default();
+        let mut writer = TensorWriter::default();
         writer.actor("actor", self);
         let header = ActorHeader { sizes: self.network().sizes().to_vec(), notes: notes.clone() };
         writer.finish(Self::KIND, &header)
@@ -100,34 +101,34 @@ impl Actor {
     /// If the bytes are truncated, of another version or kind, of inconsistent shapes, or hold a
     /// value that is not finite.
     pub fn from_bytes(bytes: &[u8]) -> Result<(Self, BTreeMap<String, String>), StoreError> {
-        let (reader, header) = Reader::open::<ActorHeader>(bytes, Self::KIND)?;
+        let (reader, header) = TensorReader::open::<ActorHeader>(bytes, Self::KIND)?;
         Ok((reader.actor("actor", &header.sizes)?, header.notes))
     }
 }
 
-/// The envelope of every header.
+/// What every header has in common.
 #[derive(Serialize, Deserialize)]
-struct Envelope<H> {
+struct StoredHeader<H> {
     format: u32,
     kind: String,
     #[serde(flatten)]
     header: H,
 }
 
-/// What can be read of a header before its kind is known.
+/// The part of a header that can be read before its kind is known.
 #[derive(Deserialize)]
-struct Preamble {
+struct HeaderKind {
     format: u32,
     kind: String,
 }
 
-/// Collects tensors, then writes them with their header.
+/// Collects tensors and writes them with their header.
 #[derive(Default)]
-pub(crate) struct Writer {
+pub(crate) struct TensorWriter {
     tensors: Vec<(String, Dtype, Vec<usize>, Vec<u8>)>,
 }
 
-impl Writer {
+impl TensorWriter {
     pub(crate) fn floats(&mut self, name: &str, shape: &[usize], values: &[f32]) {
         let bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.tensors.push((name.to_owned(), Dtype::F32, shape.to_vec(), bytes));
@@ -156,8 +157,8 @@ impl Writer {
     }
 
     pub(crate) fn finish<H: Serialize>(&self, kind: &str, header: &H) -> Vec<u8> {
-        let envelope = Envelope { format: FORMAT_VERSION, kind: kind.to_owned(), header };
-        let json = serde_json::to_string(&envelope).expect("headers are plain data");
+        let stored = StoredHeader { format: FORMAT_VERSION, kind: kind.to_owned(), header };
+        let json = serde_json::to_string(&stored).expect("headers are plain data");
         let views = self.tensors.iter().map(|(name, dtype, shape, bytes)| {
             let view = TensorView::new(*dtype, shape.clone(), bytes).expect("shapes fit their data");
             (name.as_str(), view)
@@ -167,12 +168,12 @@ impl Writer {
     }
 }
 
-/// Tensors by name, checked as they are taken.
-pub(crate) struct Reader<'a> {
+/// Tensors by name, checked when they are read.
+pub(crate) struct TensorReader<'a> {
     tensors: SafeTensors<'a>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> TensorReader<'a> {
     /// Opens a file of the given kind and reads its header.
     pub(crate) fn open<H: DeserializeOwned>(
         bytes: &'a [u8],
@@ -182,15 +183,15 @@ impl<'a> Reader<'a> {
         let json = metadata.metadata().as_ref().and_then(|map| map.get(HEADER_KEY));
         let json = json.ok_or_else(|| StoreError::Header(format!("no entry {HEADER_KEY:?}")))?;
         let broken = |error: serde_json::Error| StoreError::Header(error.to_string());
-        let preamble: Preamble = serde_json::from_str(json).map_err(broken)?;
-        if preamble.format != FORMAT_VERSION {
-            return Err(StoreError::Version { found: preamble.format });
+        let kind: HeaderKind = serde_json::from_str(json).map_err(broken)?;
+        if kind.format != FORMAT_VERSION {
+            return Err(StoreError::Version { found: kind.format });
         }
-        if preamble.kind != expected {
-            return Err(StoreError::Kind { found: preamble.kind, expected });
+        if kind.kind != expected {
+            return Err(StoreError::Kind { found: kind.kind, expected });
         }
-        let envelope: Envelope<H> = serde_json::from_str(json).map_err(broken)?;
-        Ok((Self { tensors: SafeTensors::deserialize(bytes)? }, envelope.header))
+        let stored: StoredHeader<H> = serde_json::from_str(json).map_err(broken)?;
+        Ok((Self { tensors: SafeTensors::deserialize(bytes)? }, stored.header))
     }
 
     /// A tensor of finite numbers of exactly this shape.

@@ -1,4 +1,4 @@
-//! Two tiny environments on which a learner must succeed within seconds.
+//! Two small environments that a learner solves within seconds, for tests and examples.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -15,7 +15,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// Steps in an episode, cut by a time limit.
+    /// Steps in an episode, which a time limit truncates.
     pub const EPISODE_STEPS: usize = 10;
 
     /// An identity over vectors of `len` components.
@@ -52,10 +52,11 @@ impl Environment for Identity {
     }
 }
 
-/// A mass on a plane is pushed to the origin; noisy pushes, a wall of time.
+/// A point mass on a plane that must reach the origin under noisy acceleration.
 ///
-/// Observation: place (x, y) and velocity. Action: acceleration. The episode terminates within
-/// 0.15 of the origin and is truncated after [`Self::EPISODE_STEPS`] steps.
+/// Observation: position (x, y) and velocity. Action: acceleration. The episode begins at a
+/// distance of 1, terminates within 0.15 of the origin and is truncated after
+/// [`Self::EPISODE_STEPS`] steps.
 #[derive(Clone, Debug)]
 pub struct PointMass {
     state: [f32; 4],
@@ -70,7 +71,7 @@ impl Default for PointMass {
 }
 
 impl PointMass {
-    /// Steps after which an episode is cut.
+    /// Steps after which an episode is truncated.
     pub const EPISODE_STEPS: usize = 40;
     /// Seconds in a step.
     const DT_S: f32 = 0.2;
@@ -96,11 +97,11 @@ impl Environment for PointMass {
 
     fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
         let before = self.distance();
-        let (place, velocity) = self.state.split_at_mut(2);
-        for ((place, velocity), push) in place.iter_mut().zip(velocity).zip(action) {
+        let (position, velocity) = self.state.split_at_mut(2);
+        for ((position, velocity), push) in position.iter_mut().zip(velocity).zip(action) {
             let noise: f32 = self.rng.sample(StandardNormal);
             *velocity = 0.9 * *velocity + Self::DT_S * (push + 0.1 * noise);
-            *place += Self::DT_S * *velocity;
+            *position += Self::DT_S * *velocity;
         }
         self.steps_left -= 1;
         observation.copy_from_slice(&self.state);

@@ -57,11 +57,10 @@ impl<'a> Sac<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<Self, TrainError> {
         let mut task = [FlatTask::new(world, query, (conditions, seed), budget.horizon_s)];
-        let settings = TrainSettings {
-            max_env_steps: budget.max_env_steps,
-            stop: StopRule::MeanReturn(500.0),
-            ..TrainSettings::default()
-        };
+        let settings = TrainSettings::default().with(|train| {
+            train.max_env_steps = budget.max_env_steps;
+            train.stop = StopRule::MeanReturn(500.0);
+        });
         let trained = train(&mut task, &settings, &mut seed.stream("sac", 0), observer)?;
         let (env_steps, updates) = (trained.env_steps, trained.updates);
         Ok(Self { world, query, budget, actor: trained.actor, env_steps, updates })

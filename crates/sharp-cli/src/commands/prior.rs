@@ -14,7 +14,7 @@ use sharp_options::{OptionKind, OptionSet};
 use sharp_plan::{
     Abstraction, Query, RouteScenarios, TrainingRoute, prior_train_settings, training_routes, write_atomic,
 };
-use sharp_rl::{Progress, TrainSettings, TrainState, Trained, fine_tune, resume, train};
+use sharp_rl::{Progress, TrainState, Trained, fine_tune, resume, train};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{GridFrame, OccupancyGrid, Pose, Seed, Stream};
@@ -106,7 +106,8 @@ fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> 
     }
     let courses_s = begun.elapsed().as_secs_f64();
     let Some(trained) = learn(args, &courses, seed)? else { return Ok(Exit::Interrupted) };
-    write_atomic(&args.out, &Prior::new(trained.sac).to_bytes())?;
+    let networks = trained.sac.expect("soft actor-critic returns its networks");
+    write_atomic(&args.out, &Prior::new(networks).to_bytes())?;
     // Only now: a crash before would have lost both.
     let _ = std::fs::remove_file(checkpoint(args));
     let total = begun.elapsed().as_secs_f64();
@@ -142,7 +143,7 @@ fn learn(
     seed: u64,
 ) -> Result<Option<Trained>, Failure> {
     let max_env_steps = args.steps.unwrap_or(prior_train_settings().max_env_steps);
-    let settings = TrainSettings { max_env_steps, ..prior_train_settings() };
+    let settings = prior_train_settings().with(|train| train.max_env_steps = max_env_steps);
     let noises = Arc::new(vec![NoiseModel::nominal(), NoiseModel::harsh(), NoiseModel::biased()]);
     let task = |index| {
         let scenarios = RouteScenarios::new(Arc::clone(courses), Arc::clone(&noises));
@@ -156,15 +157,15 @@ fn learn(
         if let Some(curves) = &mut curves {
             curves.note("prior", progress);
         }
-        bar.set_position(progress.state.env_steps);
+        bar.set_position(progress.env_steps);
         if let Some(evaluation) = progress.evaluation {
-            let (steps, rate) = (progress.state.env_steps, evaluation.success_rate());
+            let (steps, rate) = (progress.env_steps, evaluation.success_rate());
             bar.suspend(|| eprintln!("{steps} steps: {rate:.3}, {:.1} actions", evaluation.mean_steps));
         }
         if !progress::is_interrupted() {
             return ControlFlow::Continue(());
         }
-        interrupted = Some(progress.state.to_bytes());
+        interrupted = progress.checkpoint();
         ControlFlow::Break(())
     };
     let trained = match (read(&checkpoint(args))?, &args.from) {

@@ -8,7 +8,7 @@ use sharp_drive::{
     prior_interface,
 };
 use sharp_guide::ProgressReward;
-use sharp_rl::{Exploration, SacSettings, StopRule, TrainSettings};
+use sharp_rl::{Exploration, StopRule, TrainSettings};
 use sharp_sim::NoiseModel;
 
 use super::sac::{SacTraining, train_network};
@@ -41,20 +41,18 @@ impl Default for Selection {
             screening_episodes: 200,
             train_below: 0.97,
             // Few steps: the prior drives already, and what it has not learnt then it hardly will.
-            train: TrainSettings {
-                sac: SacSettings {
-                    learning_rate: 3e-4,
-                    updates_per_step: 0.25,
-                    warmup_steps: 1_000,
-                    exploration: Exploration::Policy,
-                    zero_last_actor_layer: false,
-                    ..crate::training_route::prior_train_settings().sac
-                },
-                max_env_steps: 12_000,
-                evaluate_every: 2_000,
-                stop: StopRule::Success { rate: 0.995, episodes: 400 },
-                ..TrainSettings::fast()
-            },
+            train: TrainSettings::fast().with(|train| {
+                train.sac = crate::training_route::prior_train_settings().sac.with(|sac| {
+                    sac.learning_rate = 3e-4;
+                    sac.updates_per_step = 0.25;
+                    sac.warmup_steps = 1_000;
+                    sac.exploration = Exploration::Policy;
+                    sac.zero_last_actor_layer = false;
+                });
+                train.max_env_steps = 12_000;
+                train.evaluate_every = 2_000;
+                train.stop = StopRule::Success { rate: 0.995, episodes: 400 };
+            }),
             environments: 16,
         }
     }
