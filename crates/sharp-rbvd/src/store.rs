@@ -83,7 +83,9 @@ impl TryFrom<StoredRbvd> for Rbvd {
         let (frame, count) = (stored.frame, stored.regions.len());
         let regions = stored.regions.iter().enumerate();
         let regions = regions
-            .map(|(position, region)| region.restore(position, &frame).ok_or(StoredRbvdError::Region(position)))
+            .map(|(position, region)| {
+                region.restore(position, &frame).ok_or(StoredRbvdError::Region(position))
+            })
             .collect::<Result<Vec<Region>, StoredRbvdError>>()?;
         Ok(Self {
             neighbors: neighbors(&stored.portals, count),
