@@ -1,17 +1,18 @@
 //! Lines 1 to 7 of Algorithm 1: regions, diagram and options of one map for one robot.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use sharp_drive::World;
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_plan::{AbstractionFile, FORMAT, OptionLibrary, hash, map_hash};
 use sharp_rbvd::{CellMetric, Rbvd, RbvdSettings};
 use sharp_regions::{
-    Heatmap, RegionPredictor, RegionSettings, Source, geometric_regions, grid_regions, predict_regions,
-    random_regions,
+    GeometricDetector, GridDetector, Heatmap, ListDetector, NetworkDetector, RandomDetector, RegionCount,
+    RegionPredictor,
 };
 use sharp_sim::{NoiseModel, RobotModel};
-use sharp_space::{Cell, Region, RegionId, Seed};
+use sharp_space::{Point, Region, RegionDetector, Seed};
 
 use crate::args::{AbstractionArgs, Kind, Learning, Metric};
 use crate::input::read_text;
@@ -79,41 +80,19 @@ pub(crate) fn regions(
     world: &World,
     choice: &str,
 ) -> Result<(Option<Heatmap>, Vec<Region>, String), Failure> {
-    let settings = RegionSettings::default();
     let (grid, footprint) = (&world.grid, &world.robot.footprint);
-    let prediction = match choice {
-        "net" => predict_regions(grid, footprint, &shipped(&world.robot), &settings),
-        "geometric" => geometric_regions(grid, footprint, &settings.geometric),
-        "random" | "grid" => return Ok(blind_regions(world, choice)),
-        file => {
-            let regions = regions_from_file(world, file)?;
-            return Ok((None, regions, file.to_owned()));
-        }
+    let network = || NetworkDetector::new(shipped(&world.robot));
+    // As many regions as the network finds: what a predictor must beat.
+    let count = || RegionCount::Like(Arc::new(network()));
+    let detection = match choice {
+        "net" => network().detect(grid, footprint),
+        "geometric" => GeometricDetector::default().detect(grid, footprint),
+        "random" => RandomDetector { count: count(), seed: Seed(1) }.detect(grid, footprint),
+        "grid" => GridDetector { count: count() }.detect(grid, footprint),
+        file => return Ok((None, regions_from_file(world, file)?, file.to_owned())),
     };
-    let source = match prediction.source {
-        Source::Network => "net",
-        Source::Geometric => "geometric",
-    };
-    Ok((Some(prediction.heatmap), prediction.regions, source.to_owned()))
-}
-
-/// Radius of the regions that know nothing of the map, metres.
-pub(crate) const BLIND_RADIUS_M: f64 = 0.5;
-
-/// As many discs as the network finds regions, at random or on a lattice: what a predictor must beat.
-fn blind_regions(world: &World, choice: &str) -> (Option<Heatmap>, Vec<Region>, String) {
-    let footprint = &world.robot.footprint;
-    let predictor = shipped(&world.robot);
-    let wanted = predict_regions(&world.grid, footprint, &predictor, &RegionSettings::default()).regions;
-    let (field, least_m) = (world.geometry.clearance(), footprint.inscribed_radius_m());
-    let regions = if choice == "grid" {
-        grid_regions(field, least_m, wanted.len(), BLIND_RADIUS_M)
-    } else {
-        let mut rng = Seed(1).stream("random regions", 0);
-        random_regions(field, least_m, wanted.len(), BLIND_RADIUS_M, &mut rng)
-    };
-    let heatmap = Heatmap::from_regions(*world.grid.frame(), &regions);
-    (Some(heatmap), regions, choice.to_owned())
+    let heatmap = detection.criticality.map(|values| Heatmap::from_values(*grid.frame(), values));
+    Ok((heatmap, detection.regions, detection.source))
 }
 
 /// The shipped network for `robot`, or the one trained for the footprint nearest in width.
@@ -126,29 +105,18 @@ fn regions_from_file(world: &World, file: &str) -> Result<Vec<Region>, Failure> 
     let broken = |problem: String| Failure::new("REGIONS_INVALID", format!("{file}: {problem}"));
     let text = read_text(file, "regions", "net, geometric, random, grid or a file")?;
     let centers: Vec<(f64, f64)> = ron::from_str(&text).map_err(|error| broken(error.to_string()))?;
-    let frame = world.grid.frame();
-    let field = world.geometry.clearance();
-    let least_m = world.robot.footprint.inscribed_radius_m();
-    let mut regions = Vec::with_capacity(centers.len());
-    for (index, &(x, y)) in centers.iter().enumerate() {
-        let cell = frame.cell_at(sharp_space::Point::new(x, y)).filter(|&cell| field.at(cell) >= least_m);
-        let cell = cell.ok_or_else(|| {
-            broken(format!("entry {index} is ({x}, {y}), expected a place with room for the robot"))
-        })?;
-        let around: Vec<Cell> = std::iter::once(cell)
-            .chain(frame.neighbors8(cell).filter(|&cell| field.at(cell) >= least_m))
-            .collect();
-        regions.extend(Region::new(RegionId(index as u32), around, field));
-    }
-    Ok(regions)
+    let places = centers.into_iter().map(|(x, y)| Point::new(x, y)).collect();
+    let found = ListDetector::new(places).regions(&world.grid, &world.robot.footprint);
+    found.map_err(|error| broken(error.to_string()))
 }
 
 /// How options are made for the robot of `world`.
 pub(crate) fn option_settings(world: &World) -> OptionSettings {
     // A car has to round the corners of its plans within them.
     let factor = if world.robot.can_turn_in_place() { 1.0 } else { 2.0 };
-    let endpoint_radius_m = factor * world.robot.goal_tolerance_m;
-    OptionSettings { endpoint_radius_m, ..OptionSettings::default() }
+    let mut settings = OptionSettings::default();
+    settings.endpoint_radius_m = factor * world.robot.goal_tolerance_m;
+    settings
 }
 
 /// How the diagram is built for the robot of `world`: half a cell is what distances may be wrong by.

@@ -1,4 +1,4 @@
-//! A family of options of one's own: from each centroid to those two steps away.
+//! Another family of options: from each centroid to those two steps away.
 
 use sharp_options::conformance::check_family;
 use sharp_options::{

@@ -18,7 +18,7 @@ use crate::family::OptionFamily;
 use crate::id::OptionId;
 use crate::set::{AllowedRule, OptionSet, OptionSettings, OptionSpec};
 
-/// What a family of options does not keep of its promises.
+/// A promise of [`OptionFamily`] that an implementation breaks.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum FamilyViolation {
@@ -34,30 +34,30 @@ pub enum FamilyViolation {
         /// The option.
         option: OptionId,
     },
-    /// The name of an option is another after it was written and read.
+    /// The name of an option changes when it is written as text and read again.
     #[error("option {option:?} does not survive as text")]
     Text {
         /// The option.
         option: OptionId,
     },
-    /// An endpoint or an option names a state, a portal or an endpoint that there is not.
-    #[error("endpoint {} names state {}, which there is not", endpoint.0, state.0)]
+    /// An endpoint names a state that does not exist.
+    #[error("endpoint {} names state {}, which does not exist", endpoint.0, state.0)]
     UnknownState {
         /// The endpoint.
         endpoint: EndpointId,
         /// The state that it names.
         state: StateId,
     },
-    /// An endpoint lies at a centroid or a portal that there is not.
-    #[error("endpoint {} lies at {site:?}, which there is not", endpoint.0)]
+    /// An endpoint lies at a centroid or a portal that does not exist.
+    #[error("endpoint {} lies at {site:?}, which does not exist", endpoint.0)]
     UnknownSite {
         /// The endpoint.
         endpoint: EndpointId,
         /// Where it claims to lie.
         site: EndpointSite,
     },
-    /// Two endpoints lie at one place: options that meet there do not share β and I.
-    #[error("endpoints {} and {} lie at one place, {site:?}, but are not shared", first.0, second.0)]
+    /// Two endpoints lie at the same place, so options that meet there do not share β and I.
+    #[error("endpoints {} and {} both lie at {site:?}, so they are not shared", first.0, second.0)]
     NotShared {
         /// One endpoint.
         first: EndpointId,
@@ -72,7 +72,7 @@ pub enum FamilyViolation {
         /// The endpoint.
         endpoint: EndpointId,
     },
-    /// An option begins where the state that it leaves is not.
+    /// An option begins at an endpoint that does not touch the state that it leaves.
     #[error("option {option} leaves state {} but begins at endpoint {}, which does not touch it",
         option.leaves().0, endpoint.0)]
     Leaves {
@@ -81,7 +81,7 @@ pub enum FamilyViolation {
         /// Its initiation set.
         endpoint: EndpointId,
     },
-    /// An option ends where the state that it enters is not.
+    /// An option ends at an endpoint that does not touch the state that it enters.
     #[error("option {option} enters state {} but ends at endpoint {}, which does not touch it",
         option.enters().0, endpoint.0)]
     Enters {
@@ -90,8 +90,8 @@ pub enum FamilyViolation {
         /// Its termination set.
         endpoint: EndpointId,
     },
-    /// A robot may not be in the centre of an option's own I or β.
-    #[error("option {option} does not allow {rule:?} the center of endpoint {}", endpoint.0)]
+    /// A rule does not allow a robot to be in the centre of the option's own I or β.
+    #[error("option {option} does not allow the center of endpoint {} under rule {rule:?}", endpoint.0)]
     NotAllowed {
         /// The option.
         option: OptionId,

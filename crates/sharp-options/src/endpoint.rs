@@ -22,7 +22,7 @@ pub enum EndpointSite {
     Centroid(StateId),
     /// A portal between two states.
     Interface(PortalId),
-    /// A place that somebody else's family of options chose, by a number of that family's own.
+    /// A place that a family from outside this library chose; the family numbers its places.
     Custom(u32),
 }
 
@@ -71,7 +71,7 @@ impl Endpoint {
         }
     }
 
-    /// The positions around `center` in its own state, for a family of one's own that calls the place
+    /// The positions around `center` in its state, for a family from outside that calls the place
     /// `number`; `None` if `center` has no state.
     #[must_use]
     pub fn at_point(

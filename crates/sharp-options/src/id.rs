@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sharp_rbvd::StateId;
 use thiserror::Error;
 
-/// The kinds of options: the paper's two, and whatever somebody else's family makes.
+/// The kinds of options: the paper's two, and those of families from outside this library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OptionKind {

@@ -1,7 +1,7 @@
 //! Option endpoints: where an option starts and where it ends.
 //!
 //! From the states and portals of an abstraction an [`OptionFamily`] makes an [`OptionSet`]: all
-//! centroid options `O_c` or all interface options `O_i` of the paper, or options of one's own. Each
+//! centroid options `O_c` or all interface options `O_i` of the paper, or options of your own. Each
 //! [`OptionSpec`] names two [`Endpoint`]s, the initiation set I and the termination set β; what
 //! happens between them is learned elsewhere. Endpoints are shared: where one option ends, the next
 //! begins (`β_i = I_{i+1}`), so learned options can be composed. An [`OptionId`] is stable text such

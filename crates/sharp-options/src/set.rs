@@ -37,6 +37,7 @@ impl OptionSpec {
 
 /// How large endpoints are.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct OptionSettings {
     /// The threshold t of Definitions 3 and 5, metres.
     pub endpoint_radius_m: f64,
@@ -105,14 +106,14 @@ impl OptionSet {
         }
     }
 
-    /// A set of one's own: `options` that start and end in `endpoints`, which are called by their
+    /// A set of `options` that start and end in `endpoints`, which are called by their
     /// positions in the list. The order of `options` does not matter.
     ///
     /// A set of [`OptionKind::Custom`] may hold options of every kind, the others only their own.
     ///
     /// # Errors
     /// Returns an error if an endpoint has no place, radius or state, or if an option names an endpoint
-    /// that there is not, is of another kind than the set, has a family letter that cannot be written,
+    /// that does not exist, is of another kind than the set, has a family letter that cannot be written,
     /// or is called like another.
     pub fn new(
         kind: OptionKind,
@@ -278,8 +279,8 @@ pub enum OptionSetError {
         /// Its position in the list, from 0.
         position: usize,
     },
-    /// An option starts or ends at an endpoint that there is not.
-    #[error("option {option} names endpoint {}, which there is not", endpoint.0)]
+    /// An option starts or ends at an endpoint that does not exist.
+    #[error("option {option} names endpoint {}, which does not exist", endpoint.0)]
     UnknownEndpoint {
         /// The option.
         option: OptionId,
@@ -301,7 +302,7 @@ pub enum OptionSetError {
         family: char,
     },
     /// Two options have one name.
-    #[error("option {option} is there twice")]
+    #[error("option {option} occurs twice")]
     Twice {
         /// The name.
         option: OptionId,

@@ -277,7 +277,7 @@ fn along_adjacent_states_each_option_ends_where_the_next_starts() {
 }
 
 #[test]
-fn every_family_keeps_its_promises_on_random_maps() {
+fn every_family_conforms_on_random_maps() {
     arbtest::arbtest(|u| {
         let Some(rbvd) = any_diagram(u)? else { return Ok(()) };
         let families: [&dyn OptionFamily; 3] = [&CentroidOptions, &InterfaceOptions, &BypassOptions];
@@ -290,7 +290,7 @@ fn every_family_keeps_its_promises_on_random_maps() {
 }
 
 #[test]
-fn a_set_of_kind_custom_is_empty_unless_somebody_fills_it() {
+fn a_custom_set_is_not_synthesised() {
     let set = options(&diagram(ROOMS_ON_A_CORRIDOR), OptionKind::Custom);
     assert_eq!((set.kind(), set.options(), set.endpoints()), (OptionKind::Custom, &[][..], &[][..]));
 }
@@ -315,9 +315,12 @@ fn broken_sets_are_refused_with_the_culprit() {
         OptionSet::new(kind, endpoints.clone(), options.to_vec()).unwrap_err().to_string()
     };
     let (centroid, own) = (OptionKind::Centroid, option("w:0-1#0", 1));
-    assert_eq!(refused(centroid, &[option("c:0-1", 7)]), "option c:0-1 names endpoint 7, which there is not");
+    assert_eq!(
+        refused(centroid, &[option("c:0-1", 7)]),
+        "option c:0-1 names endpoint 7, which does not exist"
+    );
     assert_eq!(refused(centroid, &[own]), "option w:0-1#0 is no centroid option");
-    assert_eq!(refused(OptionKind::Custom, &[own, own]), "option w:0-1#0 is there twice");
+    assert_eq!(refused(OptionKind::Custom, &[own, own]), "option w:0-1#0 occurs twice");
     let id = OptionId::Custom { family: 'C', from: StateId(0), to: StateId(1), number: 0 };
     let message = "family letter is 'C', expected one from a to z but neither c nor i";
     assert_eq!(refused(OptionKind::Custom, &[OptionSpec { id, ..own }]), message);
@@ -330,7 +333,7 @@ fn broken_sets_are_refused_with_the_culprit() {
     assert_eq!(unknown.to_string(), "there is no option w:1-0#0");
 }
 
-/// A family that breaks a promise: it gives its centroid set a second endpoint at the same place.
+/// A family that does not share endpoints: its set has a second one at the first centroid.
 #[derive(Debug)]
 struct Doubled;
 
@@ -352,7 +355,7 @@ impl OptionFamily for Doubled {
 fn the_conformance_check_finds_what_is_wrong() {
     let rbvd = diagram(ROOMS_ON_A_CORRIDOR);
     let found = check_family(&Doubled, &rbvd, &OptionSettings::default()).unwrap_err().to_string();
-    assert_eq!(found, "endpoints 0 and 3 lie at one place, Centroid(StateId(0)), but are not shared");
+    assert_eq!(found, "endpoints 0 and 3 both lie at Centroid(StateId(0)), so they are not shared");
     let spoilt = |spoil: &dyn Fn(&mut Vec<Endpoint>, &mut Vec<OptionSpec>)| {
         let set = options(&rbvd, OptionKind::Centroid);
         let (mut endpoints, mut options) = (set.endpoints().to_vec(), set.options().to_vec());
@@ -360,7 +363,7 @@ fn the_conformance_check_finds_what_is_wrong() {
         let set = OptionSet::new(OptionKind::Centroid, endpoints, options).unwrap();
         check_set(&set, &rbvd).unwrap_err().to_string()
     };
-    let message = "endpoint 1 names state 9, which there is not";
+    let message = "endpoint 1 names state 9, which does not exist";
     assert_eq!(spoilt(&|endpoints, _| endpoints[1].states = vec![StateId(9)]), message);
     let message = "endpoint 1 does not contain its own center";
     assert_eq!(spoilt(&|endpoints, _| endpoints[1].states = vec![StateId(0)]), message);

@@ -35,7 +35,8 @@ fn rbvd_build(criterion: &mut Criterion) {
     for (name, side) in [("0.25m", 500), ("1m", 1000), ("4m", 2000), ("16m", 4000)] {
         let (field, regions) = rooms(side);
         for metric in [CellMetric::Geodesic, CellMetric::Euclidean] {
-            let settings = RbvdSettings { metric, min_clearance_m: 0.4, ..RbvdSettings::default() };
+            let mut settings = RbvdSettings::default();
+            (settings.metric, settings.min_clearance_m) = (metric, 0.4);
             let build = || Rbvd::build(&field, &regions, &settings).expect("the rooms have room");
             assert_eq!(build().len(), regions.len(), "a door's region got lost");
             assert_eq!(build().component_count(), 1, "the rooms are not connected");

@@ -1,4 +1,4 @@
-//! A state abstraction of one's own: square tiles instead of critical regions.
+//! Another state abstraction than the diagram: square tiles instead of critical regions.
 
 use sharp_rbvd::conformance::check_abstraction;
 use sharp_rbvd::{Portal, PortalSettings, Rbvd, StateAbstraction, StateGrid, StateId, find_portals};

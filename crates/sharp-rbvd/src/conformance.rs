@@ -19,7 +19,7 @@ use crate::portal::{Portal, PortalId};
 /// How far a portal's point may be from the middle of its cell's side, metres: rounding only.
 const POINT_TOLERANCE_M: f64 = 1e-6;
 
-/// What an abstraction does not keep of its promises.
+/// A promise of [`StateAbstraction`] that an implementation breaks.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum AbstractionViolation {
@@ -35,7 +35,7 @@ pub enum AbstractionViolation {
         /// The state there.
         state: StateId,
     },
-    /// A cell or a portal names a state that there is not.
+    /// A cell or a portal names a state that does not exist.
     #[error("state {} is named but there are {count} states", state.0)]
     UnknownState {
         /// The state.
@@ -65,7 +65,7 @@ pub enum AbstractionViolation {
         /// The state at the centre.
         found: Option<StateId>,
     },
-    /// A state's cells fall into pieces.
+    /// The cells of a state are not connected.
     #[error("state {} is not connected: column {}, row {} is cut off from its region", state.0, cell.col, cell.row)]
     Disconnected {
         /// The state.
@@ -87,7 +87,7 @@ pub enum AbstractionViolation {
         /// The portal.
         id: PortalId,
     },
-    /// A portal's width or direction is no number, or its width is negative.
+    /// A portal's width or direction is not finite, or its width is negative.
     #[error("portal {} has no sound width or direction", id.0)]
     PortalShape {
         /// The portal.

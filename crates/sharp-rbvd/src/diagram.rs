@@ -38,6 +38,7 @@ pub enum CellMetric {
 
 /// How to cut the configuration space. The default suits a robot that is a point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct RbvdSettings {
     /// Which region counts as nearest.
     pub metric: CellMetric,
@@ -329,7 +330,7 @@ pub enum RbvdError {
         /// Number of cells.
         cells: usize,
     },
-    /// The grid is no place in the plane.
+    /// The grid cannot hold a diagram.
     #[error(transparent)]
     Cells(#[from] StateGridError),
     /// There is no room for a state.

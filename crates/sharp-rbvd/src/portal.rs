@@ -56,6 +56,7 @@ impl Portal {
 
 /// What a robot needs to pass from one state to another. The default suits a robot that is a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct PortalSettings {
     /// Clearance that the robot's centre needs to travel, metres.
     pub min_clearance_m: f64,
@@ -102,7 +103,7 @@ pub(crate) fn crossings(space: &FreeSpace, states: &[u32]) -> Vec<Crossing> {
     found
 }
 
-/// The portals of a labelling of one's own, sorted by the states they join.
+/// The portals of any labelling of a grid with states, sorted by the states they join.
 ///
 /// `clearance` is the distance field of the same grid. States meet only where both cells have the
 /// clearance that the robot needs.

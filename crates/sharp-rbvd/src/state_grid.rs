@@ -32,7 +32,7 @@ impl StateGrid {
     /// centre cannot be there, metres. It says how far the next obstacle is from a cell without state.
     ///
     /// # Errors
-    /// Returns an error if there is not one entry for each cell, if the frame has no finite place and
+    /// Returns an error if there is not one entry for each cell, if the frame has no finite origin or no
     /// positive resolution, if the clearance is negative or not finite, or if a state is called
     /// `u32::MAX`, which stands for "none".
     pub fn new(
@@ -113,7 +113,7 @@ impl StateGrid {
 #[derive(Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum StateGridError {
-    /// The frame is no place in the plane.
+    /// The frame has no finite origin or no positive resolution.
     #[error("grid's frame needs a finite origin and a positive resolution")]
     Frame,
     /// There is not one state for each cell.

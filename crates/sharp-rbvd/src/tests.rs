@@ -429,7 +429,7 @@ fn any_abstraction_can_be_stored_as_a_diagram() {
 }
 
 #[test]
-fn portals_of_a_labelling_of_ones_own_are_those_of_the_diagram() {
+fn portals_can_be_found_on_any_labelling() {
     let (grid, regions) = scene(1.0, "..A..#..B..\n...........\n.....#.....");
     let field = DistanceField::new(&grid);
     let rbvd = Rbvd::build(&field, &regions, &RbvdSettings::default()).unwrap();

@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use sharp_motion::Steering;
 use sharp_regions::{
-    Activation, ComputeDevice, LabelRobot, LabelSettings, RegionPredictor, TrainProgress, TrainSettings,
-    UNetConfig, train_regions,
+    Activation, ComputeDevice, LabelRobot, RegionPredictor, RegionTrainSettings, TrainProgress, UNetConfig,
+    train_regions,
 };
 use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{DistanceField, Footprint, OccupancyGrid, Seed};
@@ -55,8 +55,9 @@ fn device(name: &str) -> Option<ComputeDevice> {
 fn train(network: UNetConfig, device: ComputeDevice, time: Duration) -> (RegionPredictor, f64) {
     let footprint = Footprint::rectangle(0.5, 0.335).expect("a sound footprint");
     let robot = LabelRobot { footprint, steering: Steering::RotateTranslate };
-    let labels = LabelSettings { goals: 1, starts: 1, ..LabelSettings::default() };
-    let settings = TrainSettings { network, maps: 2, labels, steps: 2, device, ..TrainSettings::default() };
+    let mut settings = RegionTrainSettings::default();
+    (settings.labels.goals, settings.labels.starts) = (1, 1);
+    (settings.network, settings.device, settings.maps) = (network, device, 2);
     let run = |steps| {
         let mut times = Vec::new();
         let mut observer = |progress: &TrainProgress<'_>| {
@@ -65,7 +66,8 @@ fn train(network: UNetConfig, device: ComputeDevice, time: Duration) -> (RegionP
             }
             ControlFlow::Continue(())
         };
-        let settings = TrainSettings { steps, ..settings.clone() };
+        let mut settings = settings.clone();
+        settings.steps = steps;
         let predictor = train_regions(&robot, &settings, None, &mut observer).expect("training succeeds");
         let (first, last) = (times[0], times[times.len() - 1]);
         (predictor, (last - first).as_secs_f64() / (times.len() - 1) as f64)

@@ -1,7 +1,7 @@
-//! Do the regions of a map lie at its doors? A measure that owes nothing to labels or training.
+//! Do the regions of a map lie at its doors? This measure does not depend on labels or training.
 //!
-//! Someone who surveyed a building lists its doors. A door is found if a region comes near it; a
-//! region is put down to nothing if it comes near no door, no junction and no narrowing.
+//! The doors come from a survey of the building. A door is found if a region is near it. A region is
+//! false if it is near no door, no junction and no narrowing.
 
 use serde::Serialize;
 use sharp_space::{DistanceField, Footprint, GridFrame, Point, Region};
@@ -18,7 +18,7 @@ pub struct DoorScore {
     pub doors: usize,
     /// Doors whose middle has a region within a metre.
     pub found: usize,
-    /// Doors whose middle has a region's centre within a metre: a stricter count.
+    /// Doors whose middle has a region's centre within a metre, which is stricter.
     pub found_by_centers: usize,
     /// Share of the doors that are found.
     pub door_recall: f64,
@@ -26,7 +26,7 @@ pub struct DoorScore {
     pub regions: usize,
     /// Regions at no door, junction or narrowing.
     pub false_regions: usize,
-    /// Those over the doors found; infinite if none is.
+    /// False regions over doors found; infinite if no door is found.
     pub false_per_door: f64,
 }
 

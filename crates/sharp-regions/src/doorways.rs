@@ -1,8 +1,8 @@
 //! Doorways that the network hints at.
 //!
-//! Few plans pass the door of one office among twenty, so the network is less sure of it than of
-//! the corridor outside, and no single threshold finds the one without most of the other. A
-//! narrowing of the free space is evidence of its own: where the medial axis passes one, less heat
+//! Few plans pass the door of one office among twenty. So the network rates the door lower than the
+//! corridor outside, and a threshold low enough for the door also takes most of the corridor. A
+//! narrowing of the free space is evidence too: where the medial axis passes one, a lower threshold
 //! is enough.
 
 use sharp_space::{Cell, DistanceField, Footprint, Region, RegionId};
@@ -10,7 +10,7 @@ use sharp_space::{Cell, DistanceField, Footprint, Region, RegionId};
 use crate::extract::{extract_regions, number};
 use crate::geometric::{disc_around, doorways};
 use crate::heatmap::Heatmap;
-use crate::predict::RegionSettings;
+use crate::prediction::RegionSettings;
 
 /// The regions of `heatmap` for a robot with `footprint`: hot pieces of the map, and doorways between
 /// them that are at least warm.

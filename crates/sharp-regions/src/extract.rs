@@ -1,8 +1,8 @@
-//! Regions from a heat map: threshold, connected pieces, and none larger than a region should be.
+//! Regions from a heat map: threshold, connected pieces, and a limit on their size.
 //!
 //! The paper labels connected critical pixels and takes them as regions. A corridor that is
-//! critical from end to end would then be one region; here the threshold rises inside a piece that
-//! is too long until it falls apart, and what still holds together is covered by discs.
+//! critical from end to end would then be one region. Here the threshold rises inside a piece that
+//! is too long until the piece splits; a piece that no threshold splits is covered by discs.
 
 use serde::{Deserialize, Serialize};
 use sharp_space::{Cell, DistanceField, GridFrame, Region, RegionId};
@@ -13,6 +13,7 @@ use crate::heatmap::Heatmap;
 /// When a hot piece of a map becomes a region.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct ExtractSettings {
     /// Least criticality of a cell, 0 to 1.
     pub threshold: f64,
@@ -42,7 +43,7 @@ impl Default for ExtractSettings {
     }
 }
 
-/// How much the threshold rises at a time inside a piece that is too long.
+/// Step by which the threshold rises inside a piece that is too long.
 const THRESHOLD_STEP: f64 = 0.04;
 
 /// The regions of `heatmap` where the clearance is at least `min_clearance_m`, the radius of the
@@ -84,7 +85,7 @@ struct Split<'a> {
     clearance: &'a DistanceField,
     min_clearance_m: f64,
     settings: &'a ExtractSettings,
-    /// Scratch: cells of the set that is being taken apart.
+    /// Working memory: cells of the set that is being split.
     mark: Vec<bool>,
 }
 

@@ -1,9 +1,9 @@
 //! Critical regions from geometry alone: doorways, junctions, bends and mouths of corridors.
 //!
-//! The named fallback for when there is no network or it finds nothing: a region is put wherever
-//! the medial axis of the robot's free space passes a narrowing between two wider places, or
-//! branches or bends inside a narrow place. It approximates the paper's criticality (many
-//! solutions, small volume) without solving a single problem.
+//! This detector is the fallback if there is no network or the network finds nothing. It places a
+//! region wherever the medial axis of the robot's free space passes a narrowing between two wider
+//! places, or branches or bends inside a narrow place. This approximates the paper's criticality
+//! (many solutions, small volume) without solving any problem.
 
 use serde::{Deserialize, Serialize};
 use sharp_space::{Cell, DistanceField, Footprint, Region, RegionId};
@@ -13,6 +13,7 @@ use crate::skeleton::{Ridge, Skeleton};
 /// What counts as narrow, and how far apart regions lie.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct GeometricSettings {
     /// The widest passage that counts as narrow, metres from wall to wall.
     pub passage_max_m: f64,
@@ -33,7 +34,7 @@ impl Default for GeometricSettings {
     }
 }
 
-/// Why a site was chosen; earlier kinds win where two are too close.
+/// Why a site was chosen. If two sites are too close, the one of the earlier kind stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum SiteKind {
     Doorway,
@@ -121,14 +122,14 @@ fn narrowings(
     clearance: &DistanceField,
     settings: &GeometricSettings,
 ) -> Vec<Site> {
-    let Some((low, floor)) = lowest(ridge, clearance) else { return Vec::new() };
-    let end_height = |end: Option<usize>| end.map_or(floor, |node| clearance.at(skeleton.nodes[node].cell));
+    let Some((low, least_m)) = narrowest(ridge, clearance) else { return Vec::new() };
+    let end_height = |end: Option<usize>| end.map_or(least_m, |node| clearance.at(skeleton.nodes[node].cell));
     let rim = end_height(ridge.ends[0]).min(end_height(ridge.ends[1]));
-    if floor > settings.passage_max_m / 2.0 || rim < settings.widening * floor {
+    if least_m > settings.passage_max_m / 2.0 || rim < settings.widening * least_m {
         return Vec::new();
     }
-    // The stretch of ridge that is as good as narrowest.
-    let flat = |i: &usize| clearance.at(ridge.cells[*i]) <= settings.widening * floor;
+    // The stretch of the ridge that is nearly as narrow as its narrowest cell.
+    let flat = |i: &usize| clearance.at(ridge.cells[*i]) <= settings.widening * least_m;
     let first = (0..=low).rev().take_while(flat).last().unwrap_or(low);
     let last = (low..ridge.cells.len()).take_while(flat).last().unwrap_or(low);
     let step_m = clearance.frame().resolution_m;
@@ -143,12 +144,12 @@ fn narrowings(
     sites
 }
 
-/// The position and clearance of the narrowest cell; in a flat valley the middle one.
-fn lowest(ridge: &Ridge, clearance: &DistanceField) -> Option<(usize, f64)> {
-    let floor = ridge.cells.iter().map(|&c| clearance.at(c)).reduce(f64::min)?;
-    let at_floor: Vec<usize> =
-        (0..ridge.cells.len()).filter(|&i| clearance.at(ridge.cells[i]) <= floor).collect();
-    Some((at_floor[at_floor.len() / 2], floor))
+/// The position and clearance of the narrowest cell; the middle one if several are equal.
+fn narrowest(ridge: &Ridge, clearance: &DistanceField) -> Option<(usize, f64)> {
+    let least_m = ridge.cells.iter().map(|&c| clearance.at(c)).reduce(f64::min)?;
+    let at_least: Vec<usize> =
+        (0..ridge.cells.len()).filter(|&i| clearance.at(ridge.cells[i]) <= least_m).collect();
+    Some((at_least[at_least.len() / 2], least_m))
 }
 
 /// Keeps sites at least `spacing_m` apart, better kinds and narrower places first.
@@ -196,8 +197,8 @@ impl Buckets {
     }
 }
 
-/// The untaken cells of the robot's free space within `radius_m` of `center` and connected to it
-/// inside that disc; they are taken afterwards.
+/// The cells of the robot's free space within `radius_m` of `center` that are not taken and connected
+/// to it inside that disc. They are taken afterwards.
 pub(crate) fn disc_around(
     center: Cell,
     clearance: &DistanceField,

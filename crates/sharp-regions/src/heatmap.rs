@@ -1,4 +1,5 @@
-//! What a predictor says about every cell of a map: how critical it is and which way plans pass it.
+//! What a predictor says about every cell of a map: how critical it is and in which direction plans
+//! pass it.
 
 use sharp_space::{Cell, GridFrame, Heading, Region};
 
@@ -25,7 +26,7 @@ pub struct Heatmap {
 }
 
 impl Heatmap {
-    /// A heat map that is cold everywhere.
+    /// A heat map that is 0 everywhere.
     #[must_use]
     pub fn cold(frame: GridFrame) -> Self {
         Self { frame, criticality: vec![0.0; frame.len()], headings: vec![NO_HEADING; frame.len()] }
@@ -54,6 +55,7 @@ impl Heatmap {
         heatmap
     }
 
+    #[cfg(feature = "network")]
     pub(crate) fn with_headings(mut self, headings: Vec<u8>) -> Self {
         assert_eq!(headings.len(), self.frame.len(), "one heading class per cell");
         self.headings = headings;
@@ -81,6 +83,12 @@ impl Heatmap {
         &self.criticality
     }
 
+    /// The same values, taken out of the heat map.
+    #[must_use]
+    pub fn into_values(self) -> Vec<f32> {
+        self.criticality
+    }
+
     /// The heading most plans have at `cell`, or `None` where none was predicted.
     ///
     /// # Panics
@@ -97,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heading_classes_start_behind() {
+    fn heading_classes_start_at_minus_pi() {
         let tenth = std::f64::consts::PI / 10.0;
         for (bin, expected) in [(0, 11.0 * tenth), (5, tenth), (9, 9.0 * tenth)] {
             let turn = bin_heading(bin).turn_to(Heading::new(expected));
@@ -106,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_no_share_are_clamped() {
+    fn values_outside_0_to_1_are_clamped() {
         let frame = GridFrame {
             origin: sharp_space::Pose::new(0.0, 0.0, 0.0),
             resolution_m: 1.0,

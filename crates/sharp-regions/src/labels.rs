@@ -1,11 +1,11 @@
-//! Training labels: where the solutions of random problems go (paper, "Learning Critical Regions").
+//! Training labels: where the solutions of random problems pass (paper, "Learning Critical Regions").
 //!
 //! As in the paper, goals are drawn at random, starts for each goal, and RRT-Connect solves the
 //! problems with the robot's outline and kinematics. A pixel counts every plan that visits it once.
-//! Three things differ from the published recipe, all of them to make the labels depend on the map
-//! alone: plans are summed over all goals, so that the network needs no goal as input; the parts of
-//! a plan near its ends are left out, which replaces the removal of outliers; and visits are
-//! smoothed at a physical scale instead of by five pixels.
+//! Three things differ from the published recipe, so that the labels depend on the map alone. Plans
+//! are summed over all goals, so the network needs no goal as input. The parts of a plan near its
+//! ends are left out, which replaces the removal of outliers. Visits are smoothed at a physical scale
+//! instead of by five pixels.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ use sharp_space::{
 
 use crate::extract::components;
 use crate::heatmap::HEADING_BINS;
-use crate::image::{PIXEL_M, pixel_frame};
+use crate::pixel::{PIXEL_M, pixel_frame};
 
 /// Heading sectors counted in labels: twice as many as predicted, so that a map turned by a right
 /// angle (five sectors) has exact labels.
@@ -26,8 +26,8 @@ pub(crate) const FINE_BINS: usize = 2 * HEADING_BINS;
 /// Standard deviation of the surround that a pixel's visits are compared with, metres.
 const SURROUND_M: f64 = 1.0;
 
-/// How much of a pixel that the robot cannot reach counts as reference area: with 1 a corridor is
-/// critical from end to end, with 0 not even its mouths are.
+/// How much of a pixel that the robot cannot reach counts as reference area. With 1 a corridor is
+/// critical from end to end; with 0 not even its mouths are.
 const WALL_WEIGHT: f32 = 0.3;
 
 /// Visits below this share of the average are noise.
@@ -36,27 +36,19 @@ const QUIET_SHARE: f32 = 0.15;
 /// Criticality from which a pixel is critical.
 pub(crate) const CRITICAL_MIN: f32 = 1.6;
 
-/// Half the width of the ramp between certainly not critical and certainly critical.
-const RAMP: f32 = 0.4;
-
-/// What the network shall say of a pixel with this criticality: a ramp instead of the paper's two
-/// classes, so that the hottest part of a corridor stands out from the rest.
-pub(crate) fn target(criticality: f32) -> f32 {
-    ((criticality - (CRITICAL_MIN - RAMP)) / (2.0 * RAMP)).clamp(0.0, 1.0)
-}
-
 /// The robot whose plans make the labels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LabelRobot {
     /// Its outline.
     pub footprint: Footprint,
-    /// What it can drive.
+    /// How it can steer.
     pub steering: Steering,
 }
 
 /// How many problems are solved on a map, and what counts as critical.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct LabelSettings {
     /// Goals drawn on each map.
     pub goals: usize,
@@ -86,7 +78,7 @@ impl Default for LabelSettings {
     }
 }
 
-/// Where the plans of one map go, pixel by pixel.
+/// How often the plans of one map visit each pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labels {
     /// The pixels' frame.
@@ -99,10 +91,10 @@ pub struct Labels {
     pub solved: usize,
 }
 
-/// Solves random problems on `grid` and counts where the plans go.
+/// Solves random problems on `grid` and counts which pixels the plans visit.
 ///
 /// Every problem has a random stream of its own: the labels do not depend on the number of threads.
-/// A map without room for two poses has labels without a visit.
+/// A map without room for two poses gets labels without visits.
 #[must_use]
 pub fn label_map(grid: &OccupancyGrid, robot: &LabelRobot, settings: &LabelSettings, seed: Seed) -> Labels {
     let checker = FootprintChecker::new(grid, robot.footprint);
@@ -110,12 +102,12 @@ pub fn label_map(grid: &OccupancyGrid, robot: &LabelRobot, settings: &LabelSetti
     let cells = largest_part(checker.field(), robot.footprint.inscribed_radius_m());
     let Some(everywhere) = FromCells::new(*grid.frame(), &cells) else { return Labels::empty(frame) };
     let problems = Problems { checker: &checker, robot, settings, everywhere };
-    let tallies: Vec<Tally> = (0..settings.goals)
+    let all_counts: Vec<VisitCounts> = (0..settings.goals)
         .into_par_iter()
         .map(|goal| problems.solve_goal(&frame, seed.child("goal", goal as u64)))
         .collect();
-    let mut total = Tally::new(&frame);
-    tallies.iter().for_each(|tally| total.add(tally));
+    let mut total = VisitCounts::new(&frame);
+    all_counts.iter().for_each(|counts| total.add(counts));
     total.into_labels(frame, checker.field(), robot, settings.smoothing_m)
 }
 
@@ -127,18 +119,18 @@ struct Problems<'a> {
 }
 
 impl Problems<'_> {
-    fn solve_goal(&self, frame: &GridFrame, seed: Seed) -> Tally {
-        let mut tally = Tally::new(frame);
-        let Some(goal) = self.free_pose(&mut seed.stream("pose", 0), |_| true) else { return tally };
+    fn solve_goal(&self, frame: &GridFrame, seed: Seed) -> VisitCounts {
+        let mut counts = VisitCounts::new(frame);
+        let Some(goal) = self.free_pose(&mut seed.stream("pose", 0), |_| true) else { return counts };
         for start in 0..self.settings.starts as u64 {
             let mut rng = seed.stream("start", start);
             let far = |pose: &Pose| pose.distance_m(&goal) >= self.settings.distance_min_m;
             let Some(start) = self.free_pose(&mut rng, far) else { continue };
             if let Some(path) = self.solve(Query { start, goal }, &mut rng) {
-                tally.count(frame, &path, self.settings.endpoint_radius_m);
+                counts.count(frame, &path, self.settings.endpoint_radius_m);
             }
         }
-        tally
+        counts
     }
 
     fn solve(&self, query: Query, rng: &mut Stream) -> Option<Path> {
@@ -151,7 +143,7 @@ impl Problems<'_> {
         }
     }
 
-    /// A collision-free pose for which `fits` holds, or `None` if a thousand draws had none.
+    /// A collision-free pose for which `fits` is true, or `None` if a thousand draws gave none.
     fn free_pose(&self, rng: &mut Stream, fits: impl Fn(&Pose) -> bool) -> Option<Pose> {
         let mut sampler = self.everywhere;
         (0..1000).map(|_| sampler.sample(rng)).find(|&pose| self.checker.is_free(pose) && fits(&pose))
@@ -167,14 +159,15 @@ fn largest_part(clearance: &DistanceField, min_clearance_m: f64) -> Vec<Cell> {
     parts.into_iter().reduce(|a, b| if b.len() > a.len() { b } else { a }).unwrap_or_default()
 }
 
-/// Counts of visits; sums of whole numbers, so their order does not matter.
-struct Tally {
+/// How often plans visit each pixel. The counts are whole numbers, so the order of adding does not
+/// matter.
+struct VisitCounts {
     visits: Vec<u32>,
     headings: Vec<u32>,
     solved: usize,
 }
 
-impl Tally {
+impl VisitCounts {
     fn new(frame: &GridFrame) -> Self {
         Self { visits: vec![0; frame.len()], headings: vec![0; frame.len() * FINE_BINS], solved: 0 }
     }
@@ -258,24 +251,8 @@ impl Labels {
     }
 }
 
-/// The sector of direction `bin` after the map's symmetries have been undone: the bits of `symmetry`
-/// mirror left and right, mirror up and down, and swap the axes, in this order.
-pub(crate) fn source_bin(mut bin: usize, symmetry: usize) -> usize {
-    const HALF: usize = FINE_BINS / 2;
-    if symmetry & 1 != 0 {
-        bin = (FINE_BINS + HALF - 1 - bin) % FINE_BINS;
-    }
-    if symmetry & 2 != 0 {
-        bin = FINE_BINS - 1 - bin;
-    }
-    if symmetry & 4 != 0 {
-        bin = (FINE_BINS + FINE_BINS / 4 - 1 - bin) % FINE_BINS;
-    }
-    bin
-}
-
 /// The heading sector of an angle, counted from −π.
-fn fine_bin(heading_rad: f64) -> usize {
+pub(crate) fn fine_bin(heading_rad: f64) -> usize {
     let share = (heading_rad + std::f64::consts::PI) / std::f64::consts::TAU;
     ((share * FINE_BINS as f64) as usize).min(FINE_BINS - 1)
 }
@@ -335,23 +312,6 @@ mod tests {
         assert!(at(3.15, 2.0) > CRITICAL_MIN, "door {}", at(3.15, 2.0));
         assert!(at(0.6, 0.6) < CRITICAL_MIN, "corner {}", at(0.6, 0.6));
         assert_eq!(at(3.15, 0.5), 0.0, "wall");
-    }
-
-    #[test]
-    fn sectors_follow_the_symmetries_of_the_map() {
-        for symmetry in 0..8 {
-            for bin in 0..FINE_BINS {
-                let angle =
-                    (bin as f64 + 0.5) / FINE_BINS as f64 * std::f64::consts::TAU - std::f64::consts::PI;
-                let (mut y, mut x) = angle.sin_cos();
-                x *= if symmetry & 1 != 0 { -1.0 } else { 1.0 };
-                y *= if symmetry & 2 != 0 { -1.0 } else { 1.0 };
-                if symmetry & 4 != 0 {
-                    std::mem::swap(&mut x, &mut y);
-                }
-                assert_eq!(source_bin(bin, symmetry), fine_bin(y.atan2(x)), "bin {bin}, symmetry {symmetry}");
-            }
-        }
     }
 
     #[test]

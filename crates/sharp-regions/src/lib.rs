@@ -1,10 +1,13 @@
-//! Critical regions: where most plans pass and few random samples fall.
+//! Critical regions: places that most plans pass and few random samples hit.
 //!
-//! A [`RegionPredictor`] holds a trained network; [`predict_regions`] turns a map into a
-//! [`Prediction`]: a [`Heatmap`] and the regions in it. Where the network has nothing usable to say,
-//! [`detect_geometric`] finds doorways, junctions and mouths of corridors, and the prediction says
-//! so. [`train_regions`] makes the network for a robot from the plans of that robot on generated
+//! [`geometric_regions`] finds doorways, junctions and mouths of corridors on a map. With the feature
+//! `network`, a [`RegionPredictor`] holds a trained network, and [`predict_regions`] turns a map into a
+//! [`Prediction`]: a [`Heatmap`] and the regions in it, by geometry where the network finds nothing
+//! usable. [`train_regions`] trains the network for a robot on the plans of that robot on generated
 //! maps.
+//!
+//! Planning asks for a `RegionDetector` of sharp-space. [`NetworkDetector`], [`GeometricDetector`],
+//! [`GridDetector`], [`RandomDetector`] and [`ListDetector`] are ours.
 //!
 //! ```
 //! use sharp_regions::{GeometricSettings, Source, geometric_regions};
@@ -20,40 +23,44 @@
 //!
 //! # Features
 //!
-//! `ndarray` adds burn's older CPU backend as a second [`ComputeDevice`].
+//! - `network` (on by default): the network, its training, and the two that are shipped. Without it the
+//!   crate does not depend on burn.
+//! - `ndarray`: burn's older CPU backend as a second [`ComputeDevice`].
+#![cfg_attr(
+    not(feature = "network"),
+    allow(rustdoc::broken_intra_doc_links, reason = "links into `network`")
+)]
 
-mod batch;
-mod conv;
-mod dataset;
-mod device;
+mod detectors;
 mod doors;
 mod doorways;
 mod extract;
 mod geometric;
 mod heatmap;
-mod image;
 mod labels;
-mod loss;
-mod predict;
+#[cfg(feature = "network")]
+mod network;
+mod pixel;
+mod prediction;
+mod recipe;
 mod score;
-mod settings;
-mod shipped;
 mod skeleton;
-mod store;
-mod train;
-mod unet;
 
-pub use dataset::DatasetError;
-pub use device::ComputeDevice;
+pub use detectors::{
+    BLIND_RADIUS_M, GeometricDetector, GridDetector, ListDetector, PlaceError, RandomDetector, RegionCount,
+};
 pub use doors::{DoorScore, score_doors};
 pub use doorways::find_regions;
 pub use extract::ExtractSettings;
 pub use geometric::{GeometricSettings, detect_geometric};
 pub use heatmap::{HEADING_BINS, Heatmap};
 pub use labels::{LabelRobot, LabelSettings, Labels, label_map};
-pub use predict::{Prediction, RegionPredictor, RegionSettings, Source, geometric_regions, predict_regions};
+#[cfg(feature = "network")]
+pub use network::{
+    Activation, ComputeDevice, DatasetError, ModelCard, ModelError, NetworkDetector, RegionPredictor,
+    RegionTrainError, RegionTrainSettings, TrainFolder, TrainObserver, TrainProgress, UNetConfig,
+    predict_regions, train_regions,
+};
+pub use prediction::{Prediction, RegionSettings, Source, geometric_regions};
+pub use recipe::{HELD_OUT_KINDS, VALIDATION_KINDS};
 pub use score::{RegionScore, grid_regions, random_regions, score_regions, scoring_maps};
-pub use settings::{HELD_OUT_KINDS, TrainSettings, VALIDATION_KINDS};
-pub use store::{ModelCard, ModelError};
-pub use train::{TrainError, TrainFolder, TrainObserver, TrainProgress, train_regions};
-pub use unet::{Activation, UNetConfig};

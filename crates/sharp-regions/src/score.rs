@@ -1,15 +1,15 @@
-//! How good regions are: the score of Learn and Link, and overlap with the labels.
+//! How good regions are: the score of Learn and Link, and the overlap with the labels.
 
 use rand::RngExt;
 use serde::Serialize;
 use sharp_space::floorplan::FloorplanKind;
 use sharp_space::{Cell, DistanceField, GridFrame, OccupancyGrid, Region, RegionId, Seed, Stream};
 
-use crate::dataset::Recipe;
 use crate::geometric::disc_around;
 use crate::labels::{CRITICAL_MIN, LabelRobot, LabelSettings, Labels};
+use crate::recipe::Recipe;
 
-/// How well regions match where plans go.
+/// How well regions match the places that plans pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RegionScore {
     /// Number of regions.
@@ -18,7 +18,7 @@ pub struct RegionScore {
     /// (Molina, Kumar and Srivastava, "Learn and Link", 2020, with metres instead of pixels).
     pub mu: f64,
     /// Visits of the average pixel inside the regions over those of the average pixel outside walls:
-    /// 1 for regions put anywhere.
+    /// about 1 for regions at random places.
     pub density: f64,
     /// Share of the regions' area that is critical by the labels.
     pub precision: f64,
@@ -82,8 +82,8 @@ impl RegionScore {
     }
 }
 
-/// `count` discs of `radius_m` in the robot's free space, uniformly at random: what any predictor
-/// must beat.
+/// `count` discs of `radius_m` in the robot's free space, uniformly at random. Any predictor must do
+/// better.
 #[must_use]
 pub fn random_regions(
     clearance: &DistanceField,
@@ -105,8 +105,8 @@ pub fn random_regions(
     regions
 }
 
-/// Discs of `radius_m` on a square lattice laid so that about `count` of them lie in the robot's free
-/// space: regions that know nothing of the map.
+/// Discs of `radius_m` on a square lattice whose spacing is chosen so that about `count` of them lie in
+/// the robot's free space. Any predictor must do better.
 #[must_use]
 pub fn grid_regions(
     clearance: &DistanceField,
@@ -117,7 +117,7 @@ pub fn grid_regions(
     let frame = clearance.frame();
     let is_open = |cell: Cell| clearance.at(cell) >= min_clearance_m.max(f64::MIN_POSITIVE);
     let open = (0..frame.len()).filter(|&i| is_open(frame.cell(i))).count();
-    // Closer than a radius the discs would swallow one another.
+    // With less than a radius between them, discs would cover each other.
     let least = radius_m / frame.resolution_m;
     let spacing = (open as f64 / count.max(1) as f64).sqrt().max(least).max(1.0);
     let line = |side: usize| {
@@ -144,7 +144,12 @@ pub fn scoring_maps(
     let seed = seed.child("scoring", 0);
     let recipes =
         kinds.iter().enumerate().map(|(i, &kind)| Recipe::new(kind, i as u64, robot, settings, seed));
-    recipes.map(|recipe| (recipe.map(), recipe.make(robot).labels)).collect()
+    let labelled = |recipe: Recipe| {
+        let grid = recipe.map();
+        let labels = recipe.label(&grid, robot);
+        (grid, labels)
+    };
+    recipes.map(labelled).collect()
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! The medial axis of free space as a graph: where passages run and how wide they are.
 //!
-//! Distance-ordered homotopic thinning: cells are peeled off in the order of their clearance as
-//! long as the topology of what remains does not change, except for the anchors, the peaks of the
-//! clearance that stand out. What is left are one-cell-wide ridges that join all peaks and go
-//! round every obstacle. Ties are settled by the cells' order: equal maps give equal graphs.
+//! Distance-ordered homotopic thinning: cells are removed in the order of their clearance if that
+//! does not change the topology of the rest. The anchors, which are the prominent peaks of the
+//! clearance, are never removed. What is left are ridges one cell wide that join all peaks and
+//! surround every obstacle. Ties are broken by the cells' order: equal maps give equal graphs.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -12,7 +12,7 @@ use sharp_space::{Cell, DistanceField, GridFrame};
 
 /// A place where ridges meet or end, or where the clearance has a peak.
 #[derive(Clone, Debug)]
-pub(crate) struct Node {
+pub(crate) struct SkeletonNode {
     /// Its cell with the most clearance.
     pub cell: Cell,
     /// Number of ridges that reach it.
@@ -31,7 +31,7 @@ pub(crate) struct Ridge {
 /// The medial axis of the cells with a least clearance.
 #[derive(Clone, Debug)]
 pub(crate) struct Skeleton {
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<SkeletonNode>,
     pub ridges: Vec<Ridge>,
 }
 
@@ -75,7 +75,7 @@ impl Skeleton {
                     }
                 }
             }
-            nodes.push(Node { cell: frame.cell(best), degree: 0 });
+            nodes.push(SkeletonNode { cell: frame.cell(best), degree: 0 });
         }
         let ridges = trace_ridges(frame, thin, &node_of);
         for end in ridges.iter().flat_map(|ridge: &Ridge| ridge.ends).flatten() {
@@ -149,7 +149,7 @@ fn peaks(frame: &GridFrame, heights: &[f32], inside: &[bool], ratio: f32) -> Vec
             let rank = |peak: u32| (Reverse(heights[peak as usize].to_bits()), peak);
             let (high, low) = if rank(a) < rank(b) { (a, b) } else { (b, a) };
             let (peak, pass) = (heights[low as usize], heights[index]);
-            // Less than a cell is noise: a slanted wall alone makes that much.
+            // Less than a cell is noise: a slanted wall alone causes that much.
             let noise = 0.9 * frame.resolution_m as f32;
             is_peak[low as usize] = peak >= ratio * pass && peak - pass >= noise;
             hill[low as usize] = high;
@@ -193,8 +193,8 @@ fn by_height(heights: &[f32], set: &[bool]) -> Vec<u32> {
 
 /// Removes cells from `thin`, least clearance first, as long as its topology stays.
 ///
-/// The order of the first visits is known beforehand; only cells that must be looked at again wait
-/// in a heap, and they are few.
+/// The order of the first visits is known in advance. Only the few cells that must be visited again
+/// are kept in a heap.
 fn thin_out(frame: &GridFrame, heights: &[f32], thin: &mut [bool], anchors: &[bool]) {
     let key = |index: usize| (heights[index].to_bits(), index as u32);
     let mut queued: Vec<bool> = (0..frame.len()).map(|i| thin[i] && !anchors[i]).collect();

@@ -6,10 +6,9 @@ use serde::Serialize;
 use sharp_drive::World;
 use sharp_maps::load_doors;
 use sharp_regions::{
-    ComputeDevice, DoorScore, ExtractSettings, HELD_OUT_KINDS, LabelRobot, LabelSettings, Labels,
-    RegionPredictor, RegionScore, RegionSettings, TrainSettings, VALIDATION_KINDS, find_regions,
-    geometric_regions, grid_regions, predict_regions, random_regions, score_doors, score_regions,
-    scoring_maps,
+    BLIND_RADIUS_M, ComputeDevice, DoorScore, HELD_OUT_KINDS, LabelRobot, Labels, RegionPredictor,
+    RegionScore, RegionSettings, RegionTrainSettings, VALIDATION_KINDS, find_regions, geometric_regions,
+    grid_regions, predict_regions, random_regions, score_doors, score_regions, scoring_maps,
 };
 use sharp_sim::RobotModel;
 use sharp_space::floorplan::FloorplanKind;
@@ -18,7 +17,6 @@ use sharp_space::{DistanceField, OccupancyGrid, Point, Region, Seed};
 use crate::args::{MapArgs, RegionsScore, Unknown};
 use crate::commands::regions::label_robot;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::pipeline::BLIND_RADIUS_M;
 use crate::{input, pipeline, progress};
 
 /// Thresholds that calibration tries.
@@ -95,10 +93,11 @@ fn labelled(
     seed: u64,
 ) -> Vec<(OccupancyGrid, Labels)> {
     let kinds: Vec<_> = kinds.iter().copied().cycle().take(kinds.len() * args.maps as usize).collect();
-    let defaults = TrainSettings::default().labels;
+    let defaults = RegionTrainSettings::default().labels;
     let or = |asked: Option<u32>, default: usize| asked.map_or(default, |number| number as usize);
-    let (goals, starts) = (or(args.goals, defaults.goals), or(args.starts, defaults.starts));
-    let labels = LabelSettings { goals, starts, ..defaults };
+    let mut labels = defaults;
+    labels.goals = or(args.goals, defaults.goals);
+    labels.starts = or(args.starts, defaults.starts);
     let spinner = progress::spinner("solving problems on maps of other kinds than training's");
     let maps = scoring_maps(&kinds, robot, labels, Seed(seed));
     spinner.finish_and_clear();
@@ -168,8 +167,9 @@ fn calibrate(
         })
         .collect();
     let at = |threshold: f64, doorway_threshold: f64| {
-        let extract = ExtractSettings { threshold, doorway_threshold, ..ExtractSettings::default() };
-        let settings = RegionSettings { extract, ..RegionSettings::default() };
+        let mut settings = RegionSettings::default();
+        settings.extract.threshold = threshold;
+        settings.extract.doorway_threshold = doorway_threshold;
         let scores: Vec<RegionScore> = seen
             .iter()
             .map(|(heatmap, clearance, labels)| {

@@ -8,8 +8,8 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 use sharp_plan::write_atomic;
 use sharp_regions::{
-    ComputeDevice, LabelRobot, LabelSettings, RegionPredictor, RegionSettings, TrainError, TrainFolder,
-    TrainProgress, TrainSettings, VALIDATION_KINDS, predict_regions, train_regions,
+    ComputeDevice, LabelRobot, RegionPredictor, RegionSettings, RegionTrainError, RegionTrainSettings,
+    TrainFolder, TrainProgress, VALIDATION_KINDS, predict_regions, train_regions,
 };
 use sharp_space::floorplan::generate;
 use sharp_space::{OccupancyGrid, Seed};
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &RegionsTrain, seed: u64, json: bool) -> Result<Exit, Fa
         return Err(failure);
     }
     let predictor = match outcome {
-        Err(TrainError::Stopped { .. }) => {
+        Err(RegionTrainError::Stopped { .. }) => {
             eprintln!("stopped; --resume goes on from the checkpoint in {}", work.display());
             return Ok(Exit::Interrupted);
         }
@@ -92,25 +92,25 @@ pub(crate) fn run(args: &RegionsTrain, seed: u64, json: bool) -> Result<Exit, Fa
 }
 
 /// The preset with what else was asked for.
-fn settings(args: &RegionsTrain, seed: u64) -> Result<TrainSettings, Failure> {
-    let preset = match args.preset.as_str() {
-        "default" => TrainSettings::default(),
-        "tiny" => TrainSettings::tiny(),
-        "paper" => TrainSettings::paper(),
-        "paper-small" => TrainSettings::paper_small(),
+fn settings(args: &RegionsTrain, seed: u64) -> Result<RegionTrainSettings, Failure> {
+    let mut settings = match args.preset.as_str() {
+        "default" => RegionTrainSettings::default(),
+        "tiny" => RegionTrainSettings::tiny(),
+        "paper" => RegionTrainSettings::paper(),
+        "paper-small" => RegionTrainSettings::paper_small(),
         name => {
             let message = format!("--preset is {name:?}, expected tiny, default, paper or paper-small");
             return Err(Failure::new("USAGE", message));
         }
     };
     let or = |asked: Option<u32>, preset: usize| asked.map_or(preset, |number| number as usize);
-    let labels = LabelSettings {
-        goals: or(args.goals, preset.labels.goals),
-        starts: or(args.starts, preset.labels.starts),
-        ..preset.labels
-    };
-    let (maps, steps) = (or(args.maps, preset.maps), or(args.steps, preset.steps));
-    Ok(TrainSettings { maps, labels, steps, seed: Seed(seed), device: device(&args.device)?, ..preset })
+    settings.labels.goals = or(args.goals, settings.labels.goals);
+    settings.labels.starts = or(args.starts, settings.labels.starts);
+    settings.maps = or(args.maps, settings.maps);
+    settings.steps = or(args.steps, settings.steps);
+    settings.seed = Seed(seed);
+    settings.device = device(&args.device)?;
+    Ok(settings)
 }
 
 fn device(name: &str) -> Result<ComputeDevice, Failure> {
@@ -141,7 +141,7 @@ struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    fn new(work: &'a Path, robot: &'a LabelRobot, settings: &TrainSettings) -> Result<Self, Failure> {
+    fn new(work: &'a Path, robot: &'a LabelRobot, settings: &RegionTrainSettings) -> Result<Self, Failure> {
         let events = EventFile::create(&work.join("events")).map_err(|error| unwritable(work, error))?;
         let sample =
             generate(VALIDATION_KINDS[0], 15.0, 15.0 / 220.0, &mut settings.seed.stream("sample picture", 0));

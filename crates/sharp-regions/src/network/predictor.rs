@@ -1,150 +1,29 @@
-//! From a map to its critical regions: network, tiles, and the geometric detector as fallback.
+//! A trained network as a predictor: from a map to how critical each cell is.
 //!
 //! The network was trained at one physical scale, so maps are resampled to it. Large maps are read
-//! in overlapping tiles whose answers fade into one another: no seams, and memory for one tile.
+//! in overlapping tiles whose answers are blended, so that there are no seams and memory is needed
+//! for one tile only.
 
 use std::collections::BTreeMap;
 
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Tensor, TensorData, s};
-use serde::{Deserialize, Serialize};
-use sharp_space::{Cell, DistanceField, Footprint, GridFrame, OccupancyGrid, Region, Vector};
+use sharp_space::{Cell, DistanceField, GridFrame, OccupancyGrid, Vector};
 
-use crate::device::ComputeDevice;
-use crate::doorways::find_regions;
-use crate::extract::ExtractSettings;
-use crate::geometric::{GeometricSettings, detect_geometric};
 use crate::heatmap::{Heatmap, NO_HEADING};
-use crate::image::{Image, PIXEL_M, sample_plane};
-use crate::store::{ModelCard, ModelError, from_bytes, to_bytes};
-use crate::unet::{INPUT_PLANES, UNet};
+use crate::network::device::ComputeDevice;
+use crate::network::image::{Image, sample_plane};
+use crate::network::store::{ModelCard, ModelError, from_bytes, to_bytes};
+use crate::network::unet::{INPUT_PLANES, UNet};
+use crate::pixel::PIXEL_M;
 
 /// Side of a tile, pixels: 48 m.
 const TILE: usize = 384;
 /// Pixels that neighbouring tiles share.
 const OVERLAP: usize = 96;
-/// The outermost pixels of a tile, which see its edge and hardly count where tiles overlap.
+/// The outermost pixels of a tile, whose answers suffer from its edge: they hardly count where tiles
+/// overlap.
 const RIM: usize = 32;
-
-/// How regions are found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct RegionSettings {
-    /// From the heat map to regions.
-    pub extract: ExtractSettings,
-    /// The fallback.
-    pub geometric: GeometricSettings,
-    /// A place is in reach of a region if the way there is at most this long, metres.
-    pub reach_m: f64,
-    /// The network's regions are used unless they leave this share more of the robot's free space
-    /// out of reach than those of the fallback.
-    pub unreached_max: f64,
-    /// Maps with more pixels of 0.125 m than this are left to the fallback; 16 million take the
-    /// network about half a minute.
-    pub pixels_max: usize,
-}
-
-impl Default for RegionSettings {
-    fn default() -> Self {
-        Self {
-            extract: ExtractSettings::default(),
-            geometric: GeometricSettings::default(),
-            reach_m: 6.0,
-            unreached_max: 0.2,
-            pixels_max: 16_000_000,
-        }
-    }
-}
-
-/// Who found the regions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Source {
-    /// The network.
-    Network,
-    /// The geometric detector: there was no network, or it found nothing usable.
-    Geometric,
-}
-
-/// The critical regions of a map.
-#[derive(Clone, Debug)]
-pub struct Prediction {
-    /// How critical each cell is; what the network says even where the fallback was used.
-    pub heatmap: Heatmap,
-    /// The regions Φ, numbered from 0.
-    pub regions: Vec<Region>,
-    /// Who found them.
-    pub source: Source,
-}
-
-/// The critical regions of `grid` for a robot with `footprint`.
-///
-/// Falls back to the geometric detector if the network's regions leave much of the robot's free
-/// space out of reach that the detector's would not, or if the map is too large. A map without free
-/// space, or an open hall, has no regions.
-#[must_use]
-pub fn predict_regions(
-    grid: &OccupancyGrid,
-    footprint: &Footprint,
-    predictor: &RegionPredictor,
-    settings: &RegionSettings,
-) -> Prediction {
-    let pixels = grid.frame().width_m() / PIXEL_M * (grid.frame().height_m() / PIXEL_M);
-    if pixels > settings.pixels_max as f64 {
-        return geometric_regions(grid, footprint, &settings.geometric);
-    }
-    let clearance = DistanceField::new(grid);
-    let heatmap = predictor.heatmap(grid, &clearance);
-    let min_clearance_m = footprint.inscribed_radius_m();
-    let regions = find_regions(&heatmap, &clearance, footprint, settings);
-    let reached = |regions: &[Region]| reached_share(regions, &clearance, min_clearance_m, settings.reach_m);
-    let enough = reached(&regions) + settings.unreached_max;
-    if enough < 1.0 {
-        let geometric = detect_geometric(&clearance, footprint, &settings.geometric);
-        if reached(&geometric) > enough {
-            return Prediction { heatmap, regions: geometric, source: Source::Geometric };
-        }
-    }
-    Prediction { heatmap, regions, source: Source::Network }
-}
-
-/// The critical regions of `grid` by geometry alone.
-#[must_use]
-pub fn geometric_regions(
-    grid: &OccupancyGrid,
-    footprint: &Footprint,
-    settings: &GeometricSettings,
-) -> Prediction {
-    let regions = detect_geometric(&DistanceField::new(grid), footprint, settings);
-    Prediction { heatmap: Heatmap::from_regions(*grid.frame(), &regions), regions, source: Source::Geometric }
-}
-
-/// The share of the robot's free space from which a region is at most `reach_m` away, along the grid.
-fn reached_share(regions: &[Region], clearance: &DistanceField, min_clearance_m: f64, reach_m: f64) -> f64 {
-    let frame = clearance.frame();
-    let open = |cell: Cell| clearance.at(cell) >= min_clearance_m;
-    let mut seen = vec![false; frame.len()];
-    let mut wave: Vec<Cell> = Vec::new();
-    for &cell in regions.iter().flat_map(|region| &region.cells) {
-        if !std::mem::replace(&mut seen[frame.index(cell)], true) {
-            wave.push(cell);
-        }
-    }
-    let mut reached = wave.len();
-    for _ in 0..(reach_m / frame.resolution_m) as usize {
-        let mut next = Vec::new();
-        for cell in wave.iter().flat_map(|&cell| frame.neighbors8(cell)) {
-            if !seen[frame.index(cell)] && open(cell) {
-                seen[frame.index(cell)] = true;
-                next.push(cell);
-            }
-        }
-        reached += next.len();
-        wave = next;
-    }
-    let all = (0..frame.len()).filter(|&index| open(frame.cell(index))).count();
-    reached as f64 / all.max(1) as f64
-}
 
 /// A trained network, ready to predict.
 #[derive(Clone, Debug)]
@@ -174,7 +53,7 @@ impl RegionPredictor {
         to_bytes(&self.network, &self.card, &BTreeMap::new())
     }
 
-    /// What it is and where it comes from.
+    /// What the network is and how it was made.
     #[must_use]
     pub const fn card(&self) -> &ModelCard {
         &self.card
@@ -270,7 +149,7 @@ impl Answer {
         }
     }
 
-    /// Criticalities are averaged; the heading is that of the tile that sees the pixel best.
+    /// Criticalities are averaged; the heading is that of the tile in which the pixel has most weight.
     fn add(&mut self, pixel: usize, weight: f32, critical: f32, heading: u8) {
         self.criticality[pixel] += weight * critical;
         self.weights[pixel] += weight;
@@ -307,13 +186,14 @@ fn fade(position: usize, length: usize) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use sharp_space::Seed;
 
     use super::*;
-    use crate::unet::{Activation, UNetConfig};
+    use crate::network::unet::{Activation, UNetConfig};
 
-    fn untrained() -> RegionPredictor {
+    /// A predictor whose weights are random.
+    pub(crate) fn untrained() -> RegionPredictor {
         let network = UNetConfig { width: 2, levels: 2, patch: 2, activation: Activation::Relu };
         let card = ModelCard {
             format: ModelCard::format(),
@@ -328,10 +208,6 @@ mod tests {
         let device = ComputeDevice::Flex;
         let network = UNet::init(network, &device.device(), &mut Seed(4).stream("weights", 0));
         RegionPredictor::new(network, card, device)
-    }
-
-    fn robot() -> Footprint {
-        Footprint::rectangle(0.3, 0.2).unwrap()
     }
 
     #[test]
@@ -354,42 +230,5 @@ mod tests {
         for col in 30..600 {
             assert!((at(col) - at(col + 12)).abs() < 1e-4, "column {col}: {} and {}", at(col), at(col + 12));
         }
-    }
-
-    #[test]
-    fn degenerate_maps_get_an_answer() {
-        let specks = ["#..".repeat(100), "...".repeat(100), "...".repeat(100)].join("\n");
-        let maps = ["#", ".", "?", "....\n....", "####\n####", ".........", &vec![specks; 100].join("\n")];
-        for drawing in maps {
-            let grid = OccupancyGrid::from_ascii(0.1, drawing).unwrap();
-            let found = predict_regions(&grid, &robot(), &untrained(), &RegionSettings::default());
-            let free = |region: &Region| region.cells.iter().all(|&cell| grid.is_free(cell));
-            assert!(
-                found.regions.iter().all(free),
-                "a region in a wall of {}",
-                &drawing[..drawing.len().min(9)]
-            );
-        }
-    }
-
-    #[test]
-    fn reach_is_measured_along_free_space() {
-        let drawing = "#########\n#...#...#\n#...#...#\n#...#...#\n#########";
-        let grid = OccupancyGrid::from_ascii(1.0, drawing).unwrap();
-        let clearance = DistanceField::new(&grid);
-        let region = Region::new(sharp_space::RegionId(0), vec![Cell::new(1, 1)], &clearance).unwrap();
-        let reached = |reach_m| reached_share(std::slice::from_ref(&region), &clearance, 0.5, reach_m);
-        assert_eq!(reached(0.0), 1.0 / 18.0, "the region itself");
-        assert_eq!(reached(1.0), 4.0 / 18.0, "its neighbours too");
-        assert_eq!(reached(100.0), 0.5, "never the room behind the wall");
-    }
-
-    #[test]
-    fn a_map_that_is_too_large_is_left_to_geometry() {
-        let drawing = "#########\n#...#...#\n#.......#\n#...#...#\n#########";
-        let grid = OccupancyGrid::from_ascii(0.5, drawing).unwrap();
-        let settings = RegionSettings { pixels_max: 10, ..RegionSettings::default() };
-        let found = predict_regions(&grid, &robot(), &untrained(), &settings);
-        assert_eq!((found.source, found.regions.len()), (Source::Geometric, 1));
     }
 }

@@ -1,14 +1,14 @@
-//! The networks that come with the library; `assets/models/README.md` says how they were made.
+//! The networks that come with the library; `assets/README.md` of this crate says how they were made.
 
 use sharp_space::Footprint;
 
-use crate::device::ComputeDevice;
-use crate::predict::RegionPredictor;
+use crate::network::device::ComputeDevice;
+use crate::network::predictor::RegionPredictor;
 
 /// Robots by the names of their files.
 const SHIPPED: [(&str, &[u8]); 2] = [
-    ("husky", include_bytes!("../../../assets/models/regions-husky.safetensors")),
-    ("limo", include_bytes!("../../../assets/models/regions-limo.safetensors")),
+    ("husky", include_bytes!("../../assets/regions-husky.safetensors")),
+    ("limo", include_bytes!("../../assets/regions-limo.safetensors")),
 ];
 
 impl RegionPredictor {

@@ -5,11 +5,14 @@ use rand::RngExt;
 use sharp_space::Stream;
 use sharp_space::floorplan::turned_from;
 
-use crate::dataset::Sample;
 use crate::heatmap::HEADING_BINS;
-use crate::labels::{CRITICAL_MIN, FINE_BINS, source_bin, target};
-use crate::loss::Targets;
-use crate::unet::INPUT_PLANES;
+use crate::labels::{CRITICAL_MIN, FINE_BINS};
+use crate::network::loss::Targets;
+use crate::network::samples::Sample;
+use crate::network::unet::INPUT_PLANES;
+
+/// Half the width of the ramp between certainly not critical and certainly critical.
+const RAMP: f32 = 0.4;
 
 /// `count` random samples, each in a random symmetry.
 pub(crate) fn batch(
@@ -70,5 +73,50 @@ impl Planes {
         }
         let headed = |(&i, &sum): (&usize, &f32)| criticality[i] >= CRITICAL_MIN && sum > 0.0;
         self.headed.extend(order.iter().zip(&sums).map(|pair| f32::from(u8::from(headed(pair)))));
+    }
+}
+
+/// The network's target for a pixel with this criticality: a ramp instead of the paper's two classes,
+/// so that the most critical part of a corridor differs from the rest.
+fn target(criticality: f32) -> f32 {
+    ((criticality - (CRITICAL_MIN - RAMP)) / (2.0 * RAMP)).clamp(0.0, 1.0)
+}
+
+/// The sector of direction `bin` after the map's symmetries have been undone: the bits of `symmetry`
+/// mirror left and right, mirror up and down, and swap the axes, in this order.
+fn source_bin(mut bin: usize, symmetry: usize) -> usize {
+    const HALF: usize = FINE_BINS / 2;
+    if symmetry & 1 != 0 {
+        bin = (FINE_BINS + HALF - 1 - bin) % FINE_BINS;
+    }
+    if symmetry & 2 != 0 {
+        bin = FINE_BINS - 1 - bin;
+    }
+    if symmetry & 4 != 0 {
+        bin = (FINE_BINS + FINE_BINS / 4 - 1 - bin) % FINE_BINS;
+    }
+    bin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::labels::fine_bin;
+
+    #[test]
+    fn sectors_follow_the_symmetries_of_the_map() {
+        for symmetry in 0..8 {
+            for bin in 0..FINE_BINS {
+                let angle =
+                    (bin as f64 + 0.5) / FINE_BINS as f64 * std::f64::consts::TAU - std::f64::consts::PI;
+                let (mut y, mut x) = angle.sin_cos();
+                x *= if symmetry & 1 != 0 { -1.0 } else { 1.0 };
+                y *= if symmetry & 2 != 0 { -1.0 } else { 1.0 };
+                if symmetry & 4 != 0 {
+                    std::mem::swap(&mut x, &mut y);
+                }
+                assert_eq!(source_bin(bin, symmetry), fine_bin(y.atan2(x)), "bin {bin}, symmetry {symmetry}");
+            }
+        }
     }
 }

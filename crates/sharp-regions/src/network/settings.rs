@@ -1,24 +1,17 @@
-//! How a network is trained: presets, and which kinds of maps are kept from it.
+//! How a network is trained, with presets.
 
 use serde::{Deserialize, Serialize};
 use sharp_space::Seed;
-use sharp_space::floorplan::FloorplanKind;
 
-use crate::device::ComputeDevice;
 use crate::labels::LabelSettings;
-use crate::unet::{Activation, UNetConfig};
-
-/// Kinds of floor plans that training never sees: scores are measured on them.
-pub const HELD_OUT_KINDS: [FloorplanKind; 3] =
-    [FloorplanKind::CrossCorridors, FloorplanKind::Islands, FloorplanKind::BentCorridor];
-
-/// Kinds that neither training nor scores see: what is tuned is tuned on them.
-pub const VALIDATION_KINDS: [FloorplanKind; 2] = [FloorplanKind::Gaps, FloorplanKind::RoomsAndClutter];
+use crate::network::device::ComputeDevice;
+use crate::network::unet::{Activation, UNetConfig};
 
 /// How a network is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct TrainSettings {
+#[non_exhaustive]
+pub struct RegionTrainSettings {
     /// The network's shape.
     pub network: UNetConfig,
     /// Number of training maps; the kinds take turns.
@@ -43,7 +36,7 @@ pub struct TrainSettings {
     pub device: ComputeDevice,
 }
 
-impl Default for TrainSettings {
+impl Default for RegionTrainSettings {
     fn default() -> Self {
         Self {
             network: UNetConfig::compact(),
@@ -62,8 +55,8 @@ impl Default for TrainSettings {
     }
 }
 
-impl TrainSettings {
-    /// Done in seconds: better than chance, no more. For trying the machinery.
+impl RegionTrainSettings {
+    /// Takes seconds, and the network is only somewhat better than chance. For trying things out.
     #[must_use]
     pub fn tiny() -> Self {
         Self {
@@ -77,8 +70,8 @@ impl TrainSettings {
         }
     }
 
-    /// The paper's nonlinearity, learning rate and batch with the default's network and labels: what they
-    /// are worth where the budget is the same.
+    /// The paper's nonlinearity, learning rate and batch with the default's network and labels, to
+    /// compare them on an equal budget.
     #[must_use]
     pub fn paper_small() -> Self {
         let network = UNetConfig { activation: Activation::Tanh, ..UNetConfig::compact() };

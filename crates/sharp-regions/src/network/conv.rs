@@ -12,7 +12,7 @@ use burn::tensor::{Device, Tensor, TensorData, s};
 use rand_distr::{Distribution, Normal};
 use sharp_space::Stream;
 
-use crate::device::convolves_slowly;
+use crate::network::device::convolves_slowly;
 
 /// A convolution with bias whose output is as large as its input.
 #[derive(Module, Debug)]

@@ -3,7 +3,7 @@
 use burn::tensor::activation::log_softmax;
 use burn::tensor::{Tensor, s};
 
-/// What the network shall say, f32 `[batch, planes, rows, columns]`.
+/// What the network is trained to answer, f32 `[batch, planes, rows, columns]`.
 #[derive(Clone, Debug)]
 pub(crate) struct Targets {
     /// Criticality, 0 to 1; one plane.
@@ -19,8 +19,8 @@ pub(crate) struct Targets {
 /// The losses of criticality and headings of `logits` `[batch, 11, rows, columns]`, one number each;
 /// a critical pixel weighs `positive_weight`, one that is not weighs 1.
 ///
-/// Unlike the published code the heading loss counts at critical pixels only; elsewhere its labels
-/// are zero and would teach the network the first class.
+/// Unlike in the published code, the heading loss counts at critical pixels only. Elsewhere the labels
+/// are zero and would train the network to answer the first class.
 pub(crate) fn losses(logits: Tensor<4>, targets: &Targets, positive_weight: f64) -> (Tensor<1>, Tensor<1>) {
     let critical = criticality_loss(logits.clone().slice(s![.., 0..1, .., ..]), targets, positive_weight);
     let log_share = log_softmax(logits.slice(s![.., 1.., .., ..]), 1);
@@ -43,7 +43,7 @@ mod tests {
     use burn::tensor::{Device, TensorData};
 
     use super::*;
-    use crate::unet::OUTPUT_PLANES;
+    use crate::network::unet::OUTPUT_PLANES;
 
     /// The losses of one pixel with the criticality logit `z` and heading logits that are all equal.
     fn pixel(z: f32, y: f32, headed: f32) -> (f32, f32) {

@@ -1,4 +1,4 @@
-//! Training samples: labelled maps, kept on disk so that labelling can stop and go on.
+//! Training samples: labelled maps, kept on disk so that labelling can be stopped and resumed.
 //!
 //! One safetensors file a map, named after its number. Each carries the recipe it was made by and a
 //! checksum of its tensors; a file whose recipe or checksum does not match is made again.
@@ -8,35 +8,20 @@ use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
-use sharp_space::floorplan::{FloorplanKind, generate};
-use sharp_space::{DistanceField, GridFrame, OccupancyGrid, Pose, Seed};
+use sharp_space::floorplan::FloorplanKind;
+use sharp_space::{DistanceField, GridFrame, Pose};
 use thiserror::Error;
 
-use crate::image::{Image, PIXEL_M};
-use crate::labels::{FINE_BINS, LabelRobot, LabelSettings, Labels, label_map};
-
-const FORMAT: u32 = 1;
+use crate::labels::{FINE_BINS, LabelRobot, Labels};
+use crate::network::image::Image;
+use crate::pixel::PIXEL_M;
+use crate::recipe::{FORMAT, Recipe};
 
 /// A labelled map.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
     pub image: Image,
     pub labels: Labels,
-}
-
-/// A map of a dataset, and everything its labels depend on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Recipe {
-    format: u32,
-    pub kind: FloorplanKind,
-    pub number: u64,
-    pub size_m: f64,
-    pub resolution_m: f64,
-    half_length_m: f64,
-    half_width_m: f64,
-    radius_m: f64,
-    labels: LabelSettings,
-    seed: Seed,
 }
 
 /// Why a dataset could not be read or written.
@@ -56,40 +41,11 @@ pub enum DatasetError {
 }
 
 impl Recipe {
-    pub(crate) fn new(
-        kind: FloorplanKind,
-        number: u64,
-        robot: &LabelRobot,
-        labels: LabelSettings,
-        seed: Seed,
-    ) -> Self {
-        Self {
-            format: FORMAT,
-            kind,
-            number,
-            size_m: 15.0,
-            // 220 cells: no whole number of cells is a pixel, as with most real maps.
-            resolution_m: 15.0 / 220.0,
-            half_length_m: robot.footprint.half_length_m(),
-            half_width_m: robot.footprint.half_width_m(),
-            radius_m: robot.steering.radius_m(),
-            labels,
-            seed,
-        }
-    }
-
-    /// The map, without its labels.
-    pub(crate) fn map(&self) -> OccupancyGrid {
-        let mut rng = self.seed.stream("floorplan", self.number);
-        generate(self.kind, self.size_m, self.resolution_m, &mut rng)
-    }
-
     /// Makes the sample.
     pub(crate) fn make(&self, robot: &LabelRobot) -> Sample {
         let grid = self.map();
         let image = Image::new(&grid, &DistanceField::new(&grid));
-        let labels = label_map(&grid, robot, &self.labels, self.seed.child("labels", self.number));
-        Sample { image, labels }
+        Sample { image, labels: self.label(&grid, robot) }
     }
 
     /// The sample from `folder` if it is there and sound, else a new one, which is then stored.
@@ -104,10 +60,10 @@ impl Recipe {
     }
 
     /// The line of the manifest about `sample`.
-    pub(crate) fn entry(&self, sample: &Sample) -> Entry {
+    pub(crate) fn entry(&self, sample: &Sample) -> DatasetEntry {
         let file = self.file_name();
         let hash = blake3::hash(&self.to_bytes(sample)).to_hex().to_string();
-        Entry { file, kind: self.kind, solved: sample.labels.solved, blake3: hash }
+        DatasetEntry { file, kind: self.kind, solved: sample.labels.solved, blake3: hash }
     }
 
     fn file_name(&self) -> String {
@@ -130,7 +86,7 @@ impl Recipe {
         let shape = vec![frame.height, frame.width, FINE_BINS];
         views.push(("headings", TensorView::new(Dtype::U8, shape, &sample.labels.headings)));
         let views = views.into_iter().map(|(name, view)| (name, view.expect("one value a pixel")));
-        let note = Note {
+        let note = SampleNote {
             recipe: self.clone(),
             solved: sample.labels.solved,
             checksum: checksum(planes.iter().map(|(_, data)| data.as_slice()), &sample.labels.headings),
@@ -143,7 +99,8 @@ impl Recipe {
     /// The sample in `bytes`, or `None` if it is not the one of this recipe or is damaged.
     fn read(&self, bytes: &[u8]) -> Option<Sample> {
         let (_, metadata) = SafeTensors::read_metadata(bytes).ok()?;
-        let note: Note = serde_json::from_str(metadata.metadata().as_ref()?.get("sharp.sample")?).ok()?;
+        let note: SampleNote =
+            serde_json::from_str(metadata.metadata().as_ref()?.get("sharp.sample")?).ok()?;
         let tensors = SafeTensors::deserialize(bytes).ok()?;
         let data = |name| tensors.tensor(name).map(|view| view.data()).ok();
         let planes = [data("blocked")?, data("clearance")?, data("visits")?];
@@ -171,27 +128,27 @@ impl Recipe {
 
 /// What the manifest says of a map.
 #[derive(Debug, Serialize)]
-pub(crate) struct Entry {
+pub(crate) struct DatasetEntry {
     file: String,
     kind: FloorplanKind,
     solved: usize,
     blake3: String,
 }
 
-/// Lists the files of a dataset with their hashes, for whoever copies it.
-pub(crate) fn write_manifest(folder: &Path, maps: &[Entry]) -> Result<(), DatasetError> {
+/// Lists the files of a dataset with their hashes, so that a copy can be checked.
+pub(crate) fn write_manifest(folder: &Path, maps: &[DatasetEntry]) -> Result<(), DatasetError> {
     #[derive(Serialize)]
-    struct Manifest<'a> {
+    struct DatasetManifest<'a> {
         format: u32,
-        maps: &'a [Entry],
+        maps: &'a [DatasetEntry],
     }
-    let json = serde_json::to_string_pretty(&Manifest { format: FORMAT, maps });
+    let json = serde_json::to_string_pretty(&DatasetManifest { format: FORMAT, maps });
     let json = json.expect("a manifest has no keys that are not text") + "\n";
     write_whole(&folder.join("manifest.json"), json.as_bytes())
 }
 
 #[derive(Serialize, Deserialize)]
-struct Note {
+struct SampleNote {
     recipe: Recipe,
     solved: usize,
     checksum: String,
@@ -206,7 +163,7 @@ fn checksum<'a>(planes: impl Iterator<Item = &'a [u8]>, headings: &[u8]) -> Stri
     hasher.finalize().to_hex().to_string()
 }
 
-/// Writes a file beside its final name and renames it: readers see all of it or nothing.
+/// Writes a file under another name and renames it, so that readers see the whole file or none.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
     let failed = |action| move |error| DatasetError::File { action, path: path.to_owned(), error };
     if let Some(folder) = path.parent() {
@@ -220,33 +177,33 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), DatasetError>
 #[cfg(test)]
 mod tests {
     use sharp_motion::Steering;
-    use sharp_space::Footprint;
+    use sharp_space::{Footprint, Seed};
 
     use super::*;
+    use crate::labels::LabelSettings;
 
     fn robot() -> LabelRobot {
         let footprint = Footprint::rectangle(0.3, 0.2).unwrap();
         LabelRobot { footprint, steering: Steering::RotateTranslate }
     }
 
-    fn recipe() -> Recipe {
+    fn recipe(seed: Seed) -> Recipe {
         let labels = LabelSettings { goals: 2, starts: 3, ..LabelSettings::default() };
-        Recipe::new(FloorplanKind::Gap, 3, &robot(), labels, Seed(1))
+        Recipe::new(FloorplanKind::Gap, 3, &robot(), labels, seed)
     }
 
     #[test]
     fn samples_survive_a_round_trip_and_damage_is_noticed() {
-        let recipe = recipe();
-        let sample = recipe.make(&robot());
-        let bytes = recipe.to_bytes(&sample);
-        let read = recipe.read(&bytes).expect("an undamaged sample is read");
+        let first = recipe(Seed(1));
+        let sample = first.make(&robot());
+        let bytes = first.to_bytes(&sample);
+        let read = first.read(&bytes).expect("an undamaged sample is read");
         assert_eq!(read.labels, sample.labels);
         assert_eq!(read.image.blocked, sample.image.blocked);
         let mut damaged = bytes.clone();
         *damaged.last_mut().unwrap() ^= 1;
-        assert!(recipe.read(&damaged).is_none(), "one bit is wrong");
-        assert!(recipe.read(&bytes[..bytes.len() / 2]).is_none(), "cut in half");
-        let other = Recipe { seed: Seed(2), ..recipe };
-        assert!(other.read(&bytes).is_none(), "made by another recipe");
+        assert!(first.read(&damaged).is_none(), "one bit is wrong");
+        assert!(first.read(&bytes[..bytes.len() / 2]).is_none(), "cut in half");
+        assert!(recipe(Seed(2)).read(&bytes).is_none(), "made by another recipe");
     }
 }

@@ -14,8 +14,8 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use sharp_space::Stream;
 
-use crate::conv::Conv;
 use crate::heatmap::HEADING_BINS;
+use crate::network::conv::Conv;
 
 /// Input planes: share of the pixel that is blocked, and clearance.
 pub(crate) const INPUT_PLANES: usize = 2;
@@ -104,12 +104,12 @@ pub(crate) struct UNet {
     up: Vec<Block>,
     head: Conv,
     #[module(skip)]
-    config: Shape,
+    config: FixedConfig,
 }
 
 /// The configuration in the form that a burn module may hold.
 #[derive(Clone, Copy, Debug)]
-struct Shape(UNetConfig);
+struct FixedConfig(UNetConfig);
 
 impl UNet {
     /// A network with weights drawn from `rng`.
@@ -129,7 +129,7 @@ impl UNet {
         let rise = steps.iter().map(|&to| Conv::init((2 * to, 4 * to), 1, 1.0, device, rng)).collect();
         let up = steps.iter().map(|&to| Block::init((2 * to, to), gain, device, rng)).collect();
         let head = Conv::init((config.width, OUTPUT_PLANES * pixels), 1, 1.0, device, rng);
-        let network = Self { down, rise, up, head, config: Shape(config) };
+        let network = Self { down, rise, up, head, config: FixedConfig(config) };
         // Equal networks have equal parameter ids, so that a stored optimiser finds its weights.
         network.map(&mut Renumber { next: 1 })
     }

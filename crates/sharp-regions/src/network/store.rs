@@ -1,7 +1,7 @@
 //! Networks as files: safetensors, with what the network is as JSON beside the weights.
 //!
-//! Readers trust nothing: a file that is cut short, has other shapes than its own description asks
-//! for, or holds a number that is not finite is refused with the reason.
+//! A file that is cut short, has other shapes than its own description asks for, or holds a number
+//! that is not finite is refused with the reason.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use sharp_space::Seed;
 use thiserror::Error;
 
-use crate::unet::{UNet, UNetConfig};
+use crate::network::unet::{UNet, UNetConfig};
 
 /// The version of the format that is written and read.
 const FORMAT: u32 = 1;
@@ -210,7 +210,7 @@ impl ModuleMapper for Replace<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::unet::Activation;
+    use crate::network::unet::Activation;
 
     fn model() -> (UNet, ModelCard) {
         let network = UNetConfig { width: 2, levels: 2, patch: 2, activation: Activation::Relu };

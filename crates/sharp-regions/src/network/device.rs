@@ -21,7 +21,7 @@ impl ComputeDevice {
         match self {
             Self::Flex => Device::flex(),
             #[cfg(feature = "ndarray")]
-            #[allow(deprecated, reason = "kept as a second opinion for as long as burn ships it")]
+            #[allow(deprecated, reason = "kept as a second opinion while burn ships it")]
             Self::Ndarray => Device::ndarray(),
         }
     }

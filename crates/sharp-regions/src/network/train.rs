@@ -1,8 +1,8 @@
 //! Training of the region network for one robot: labels, optimisation, checkpoints.
 //!
 //! Adam on the weighted logarithmic loss, as in the paper; the step size falls along a cosine.
-//! Every map is seen in its eight symmetries. Each batch has a random stream of its own, so that a
-//! run that is continued from its checkpoint ends with the network of a run that never stopped.
+//! Every map is used in its eight symmetries. Each batch has a random stream of its own, so a run that
+//! resumes from its checkpoint ends with the same network as a run that never stopped.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -14,14 +14,15 @@ use burn::tensor::{Bytes, Device};
 use sharp_space::floorplan::FloorplanKind;
 use thiserror::Error;
 
-use crate::batch::batch;
-use crate::dataset::{DatasetError, Recipe, Sample, write_manifest, write_whole};
 use crate::labels::LabelRobot;
-use crate::loss::losses;
-use crate::predict::RegionPredictor;
-use crate::settings::{HELD_OUT_KINDS, TrainSettings, VALIDATION_KINDS};
-use crate::store::{ModelCard, ModelError, extra_bytes, from_bytes, to_bytes};
-use crate::unet::UNet;
+use crate::network::batch::batch;
+use crate::network::loss::losses;
+use crate::network::predictor::RegionPredictor;
+use crate::network::samples::{DatasetError, Sample, write_manifest, write_whole};
+use crate::network::settings::RegionTrainSettings;
+use crate::network::store::{ModelCard, ModelError, extra_bytes, from_bytes, to_bytes};
+use crate::network::unet::UNet;
+use crate::recipe::{HELD_OUT_KINDS, Recipe, VALIDATION_KINDS};
 
 /// The name of the tensor with the optimiser's state in a checkpoint.
 const OPTIMIZER: &str = "optimizer";
@@ -33,12 +34,12 @@ const SETTINGS: &str = "settings";
 pub struct TrainFolder<'a> {
     /// Where it is; made if it is not there.
     pub path: &'a Path,
-    /// Go on from the checkpoint in it instead of starting anew. Labels that are there are used
-    /// in any case.
+    /// Resume from the checkpoint in it instead of starting again. Labels in it are used in both
+    /// cases.
     pub resume: bool,
 }
 
-/// What training tells while it runs.
+/// What training reports while it runs.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum TrainProgress<'a> {
@@ -78,8 +79,8 @@ pub enum TrainProgress<'a> {
 /// Why training stopped without a network.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum TrainError {
-    /// A setting is of no use.
+pub enum RegionTrainError {
+    /// A setting is out of range.
     #[error("training setting {field} is {value}, must be at least 1")]
     Setting {
         /// Its name.
@@ -93,7 +94,7 @@ pub enum TrainError {
     /// Labels or checkpoints could not be read or written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// The loss is no number any more.
+    /// The loss is not finite.
     #[error("loss is {loss} at step {step}, try a smaller learning rate")]
     Diverged {
         /// The step.
@@ -101,7 +102,7 @@ pub enum TrainError {
         /// The loss.
         loss: f32,
     },
-    /// The checkpoint cannot be gone on from.
+    /// Training cannot resume from the checkpoint.
     #[error("checkpoint {path} {reason}; delete it to start over", path = path.display())]
     Checkpoint {
         /// The file.
@@ -117,30 +118,30 @@ pub enum TrainError {
     },
 }
 
-/// Who hears of every map, step and checkpoint, and may break training off.
+/// A function that is called for every map, step and checkpoint, and may stop training.
 pub type TrainObserver<'a> = dyn FnMut(&TrainProgress<'_>) -> ControlFlow<()> + 'a;
 
-/// Trains a network on the plans of `robot`; `observer` hears of every map, step and checkpoint.
+/// Trains a network on the plans of `robot`; `observer` is called for every map, step and checkpoint.
 ///
-/// With a `folder`, labels and checkpoints are kept there, and a run that was stopped can go on
-/// where it was. A run that the observer breaks off leaves a checkpoint.
+/// With a `folder`, labels and checkpoints are kept there, and a run that was stopped can be resumed.
+/// A run that the observer stops leaves a checkpoint.
 ///
 /// # Errors
-/// Returns an error if a setting is of no use, the folder cannot be written, its checkpoint is
-/// damaged or of another run, the loss diverges, or the observer breaks off.
+/// Returns an error if a setting is out of range, the folder cannot be written, its checkpoint is
+/// damaged or of another run, the loss diverges, or the observer stops the run.
 pub fn train_regions(
     robot: &LabelRobot,
-    settings: &TrainSettings,
+    settings: &RegionTrainSettings,
     folder: Option<TrainFolder<'_>>,
     observer: &mut TrainObserver<'_>,
-) -> Result<RegionPredictor, TrainError> {
+) -> Result<RegionPredictor, RegionTrainError> {
     check(settings)?;
     let samples = label_maps(robot, settings, folder.map(|folder| folder.path), observer)?;
     let checkpoint = folder.map(|folder| folder.path.join("checkpoint.safetensors"));
     let resumed = checkpoint.as_deref().filter(|path| folder.is_some_and(|f| f.resume) && path.exists());
     let mut run = match resumed {
-        Some(path) => Run::resume(robot, settings, path)?,
-        None => Run::start(robot, settings),
+        Some(path) => RegionTraining::resume(robot, settings, path)?,
+        None => RegionTraining::start(robot, settings),
     };
     while run.card.steps < settings.steps {
         let progress = run.step(&samples, settings)?;
@@ -155,17 +156,17 @@ pub fn train_regions(
                 && observer(&TrainProgress::Checkpoint { step, predictor: &run.predictor(settings) })
                     .is_break();
         if stop && step < settings.steps {
-            return Err(TrainError::Stopped { step });
+            return Err(RegionTrainError::Stopped { step });
         }
     }
     Ok(run.predictor(settings))
 }
 
-fn check(settings: &TrainSettings) -> Result<(), TrainError> {
+fn check(settings: &RegionTrainSettings) -> Result<(), RegionTrainError> {
     let counts =
         [("maps", settings.maps), ("batch", settings.batch), ("checkpoint_steps", settings.checkpoint_steps)];
     if let Some((field, value)) = counts.into_iter().find(|&(_, value)| value == 0) {
-        return Err(TrainError::Setting { field, value });
+        return Err(RegionTrainError::Setting { field, value });
     }
     if !settings.network.is_sound() {
         return Err(ModelError::Network(settings.network).into());
@@ -176,10 +177,10 @@ fn check(settings: &TrainSettings) -> Result<(), TrainError> {
 /// Labels the training maps, or reads those that are already labelled.
 fn label_maps(
     robot: &LabelRobot,
-    settings: &TrainSettings,
+    settings: &RegionTrainSettings,
     folder: Option<&Path>,
     observer: &mut TrainObserver<'_>,
-) -> Result<Vec<Sample>, TrainError> {
+) -> Result<Vec<Sample>, RegionTrainError> {
     let is_kept = |kind: &FloorplanKind| HELD_OUT_KINDS.contains(kind) || VALIDATION_KINDS.contains(kind);
     let kinds: Vec<_> = FloorplanKind::ALL.into_iter().filter(|kind| !is_kept(kind)).collect();
     let maps = folder.map(|folder| folder.join("maps"));
@@ -196,7 +197,7 @@ fn label_maps(
         entries.push(recipe.entry(&sample));
         samples.push(sample);
         if observer(&TrainProgress::Labelled { map: number + 1, of: settings.maps, solved }).is_break() {
-            return Err(TrainError::Stopped { step: 0 });
+            return Err(RegionTrainError::Stopped { step: 0 });
         }
     }
     if let Some(folder) = &maps {
@@ -205,16 +206,16 @@ fn label_maps(
     Ok(samples)
 }
 
-/// A network on its way.
-struct Run {
+/// A network in training.
+struct RegionTraining {
     network: UNet,
     optimizer: ModuleOptimizer,
     card: ModelCard,
     device: Device,
 }
 
-impl Run {
-    fn start(robot: &LabelRobot, settings: &TrainSettings) -> Self {
+impl RegionTraining {
+    fn start(robot: &LabelRobot, settings: &RegionTrainSettings) -> Self {
         let device = settings.device.device().autodiff();
         let card = ModelCard {
             format: ModelCard::format(),
@@ -230,9 +231,13 @@ impl Run {
         Self { network, optimizer: optimizer(), card, device }
     }
 
-    /// Goes on from the checkpoint at `path`.
-    fn resume(robot: &LabelRobot, settings: &TrainSettings, path: &Path) -> Result<Self, TrainError> {
-        let refused = |reason: String| TrainError::Checkpoint { path: path.to_owned(), reason };
+    /// Resumes from the checkpoint at `path`.
+    fn resume(
+        robot: &LabelRobot,
+        settings: &RegionTrainSettings,
+        path: &Path,
+    ) -> Result<Self, RegionTrainError> {
+        let refused = |reason: String| RegionTrainError::Checkpoint { path: path.to_owned(), reason };
         let damaged = |error: &dyn std::fmt::Display| refused(format!("is damaged: {error}"));
         let bytes = std::fs::read(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
         let fresh = Self::start(robot, settings);
@@ -247,7 +252,7 @@ impl Run {
         Ok(Self { network, optimizer, card, device: fresh.device })
     }
 
-    fn save(&self, settings: &TrainSettings, path: &Path) -> Result<(), TrainError> {
+    fn save(&self, settings: &RegionTrainSettings, path: &Path) -> Result<(), RegionTrainError> {
         let state = self.optimizer.into_bytes().expect("a CPU optimiser's state can be read");
         let extra = BTreeMap::from([
             (OPTIMIZER.to_owned(), state.to_vec()),
@@ -256,7 +261,7 @@ impl Run {
         Ok(write_whole(path, &to_bytes(&self.network, &self.card, &extra))?)
     }
 
-    fn predictor(&self, settings: &TrainSettings) -> RegionPredictor {
+    fn predictor(&self, settings: &RegionTrainSettings) -> RegionPredictor {
         RegionPredictor::new(self.network.valid(), self.card.clone(), settings.device)
     }
 
@@ -264,8 +269,8 @@ impl Run {
     fn step(
         &mut self,
         samples: &[Sample],
-        settings: &TrainSettings,
-    ) -> Result<TrainProgress<'static>, TrainError> {
+        settings: &RegionTrainSettings,
+    ) -> Result<TrainProgress<'static>, RegionTrainError> {
         let step = self.card.steps;
         let mut rng = settings.seed.stream("batch", step as u64);
         let base = settings.device.device();
@@ -276,7 +281,7 @@ impl Run {
         let loss = critical + heading * settings.heading_weight;
         let value = loss.clone().into_scalar::<f32>();
         if !value.is_finite() {
-            return Err(TrainError::Diverged { step, loss: value });
+            return Err(RegionTrainError::Diverged { step, loss: value });
         }
         let gradients = GradientsParams::from_grads(loss.backward(), &self.network);
         let learning_rate = learning_rate(settings, step);
@@ -287,9 +292,9 @@ impl Run {
     }
 }
 
-/// All that the run depends on; how often it is saved changes nothing.
-fn as_json(settings: &TrainSettings) -> Vec<u8> {
-    let settings = TrainSettings { checkpoint_steps: 1, ..settings.clone() };
+/// All settings that the result depends on; how often it is saved does not count.
+fn as_json(settings: &RegionTrainSettings) -> Vec<u8> {
+    let settings = RegionTrainSettings { checkpoint_steps: 1, ..settings.clone() };
     serde_json::to_vec(&settings).expect("settings have no keys that are not text")
 }
 
@@ -298,8 +303,8 @@ fn optimizer() -> ModuleOptimizer {
     AdamConfig::new().with_epsilon(1e-8).init()
 }
 
-/// A short ramp, then half a cosine down to nothing.
-fn learning_rate(settings: &TrainSettings, step: usize) -> f64 {
+/// A short ramp, then half a cosine down to zero.
+fn learning_rate(settings: &RegionTrainSettings, step: usize) -> f64 {
     const RAMP_STEPS: f64 = 20.0;
     let ramp = ((step + 1) as f64 / RAMP_STEPS).min(1.0);
     let share = step as f64 / settings.steps as f64;
@@ -314,7 +319,7 @@ mod tests {
 
     use super::*;
     use crate::labels::LabelSettings;
-    use crate::unet::{Activation, UNetConfig};
+    use crate::network::unet::{Activation, UNetConfig};
     use crate::{RegionScore, RegionSettings, find_regions, random_regions, score_regions, scoring_maps};
 
     fn robot() -> LabelRobot {
@@ -322,8 +327,8 @@ mod tests {
         LabelRobot { footprint, steering: Steering::RotateTranslate }
     }
 
-    fn settings(steps: usize) -> TrainSettings {
-        TrainSettings {
+    fn settings(steps: usize) -> RegionTrainSettings {
+        RegionTrainSettings {
             network: UNetConfig { width: 4, levels: 2, patch: 2, activation: Activation::Relu },
             maps: 2,
             labels: LabelSettings { goals: 4, starts: 5, ..LabelSettings::default() },
@@ -331,16 +336,16 @@ mod tests {
             batch: 2,
             learning_rate: 1e-2,
             checkpoint_steps: 4,
-            ..TrainSettings::default()
+            ..RegionTrainSettings::default()
         }
     }
 
     /// Trains to the end, or until after step `stop`.
     fn train(
-        settings: &TrainSettings,
+        settings: &RegionTrainSettings,
         folder: Option<TrainFolder<'_>>,
         stop: Option<usize>,
-    ) -> (Result<RegionPredictor, TrainError>, Vec<f32>) {
+    ) -> (Result<RegionPredictor, RegionTrainError>, Vec<f32>) {
         let mut losses = Vec::new();
         let mut observer = |progress: &TrainProgress<'_>| {
             if let TrainProgress::Step { loss, step, .. } = progress {
@@ -365,7 +370,7 @@ mod tests {
 
     #[test]
     fn the_tiny_preset_beats_random_regions_on_kinds_it_never_saw() {
-        let predictor = train(&TrainSettings::tiny(), None, None).0.unwrap();
+        let predictor = train(&RegionTrainSettings::tiny(), None, None).0.unwrap();
         let labels = LabelSettings { goals: 8, starts: 10, ..LabelSettings::default() };
         let mut scores = [Vec::new(), Vec::new()];
         for (index, (grid, labels)) in
@@ -388,7 +393,7 @@ mod tests {
     #[test]
     fn equal_seeds_give_equal_weights_stopped_anywhere_or_not() {
         let whole = train(&settings(8), None, None).0.unwrap().to_bytes();
-        let other = TrainSettings { seed: Seed(2), ..settings(8) };
+        let other = RegionTrainSettings { seed: Seed(2), ..settings(8) };
         assert_ne!(train(&other, None, None).0.unwrap().to_bytes(), whole, "another seed");
         let stop = Seed(77).stream("stop", 0).random_range(1..8);
         let folder = tempfile::tempdir().unwrap();
@@ -407,8 +412,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |resume| Some(TrainFolder { path: folder.path(), resume });
         train(&settings(4), at(false), None).0.unwrap();
-        let refusal = |settings: &TrainSettings| train(settings, at(true), None).0.unwrap_err().to_string();
-        let other = TrainSettings { learning_rate: 1e-3, ..settings(4) };
+        let refusal =
+            |settings: &RegionTrainSettings| train(settings, at(true), None).0.unwrap_err().to_string();
+        let other = RegionTrainSettings { learning_rate: 1e-3, ..settings(4) };
         assert!(refusal(&other).contains("is of a run with other settings"), "{}", refusal(&other));
         let path = folder.path().join("checkpoint.safetensors");
         let bytes = std::fs::read(&path).unwrap();
@@ -425,8 +431,8 @@ mod tests {
     }
 
     #[test]
-    fn useless_settings_are_refused() {
-        let refused = TrainSettings { batch: 0, ..settings(1) };
+    fn settings_out_of_range_are_refused() {
+        let refused = RegionTrainSettings { batch: 0, ..settings(1) };
         let error = train(&refused, None, None).0.unwrap_err();
         assert_eq!(error.to_string(), "training setting batch is 0, must be at least 1");
     }

@@ -2,8 +2,7 @@
 
 use sharp_space::{Cell, DistanceField, GridFrame, OccupancyGrid, Vector};
 
-/// Side of a pixel, metres: four to fifteen pixels across the doors and corridors that matter.
-pub(crate) const PIXEL_M: f64 = 0.125;
+use crate::pixel::{PIXEL_M, pixel_frame};
 
 /// Clearance beyond which the network sees no difference, metres.
 const CLEARANCE_MAX_M: f64 = 2.0;
@@ -27,18 +26,6 @@ impl Image {
             (distance_m / CLEARANCE_MAX_M).min(1.0) as f32
         };
         Self { frame, blocked: coverage(grid, &frame), clearance: (0..frame.len()).map(near).collect() }
-    }
-}
-
-/// The pixels that cover a grid: same origin, the last row and column may stick out.
-pub(crate) fn pixel_frame(grid: &GridFrame) -> GridFrame {
-    // A hair less, so that 15 m of cells that do not add up exactly are still 120 pixels.
-    let pixels = |length_m: f64| ((length_m / PIXEL_M - 1e-6).ceil() as usize).max(1);
-    GridFrame {
-        origin: grid.origin,
-        resolution_m: PIXEL_M,
-        width: pixels(grid.width_m()),
-        height: pixels(grid.height_m()),
     }
 }
 
