@@ -1,8 +1,8 @@
 //! How a network is trained: presets, and which kinds of maps are kept from it.
 
 use serde::{Deserialize, Serialize};
+use sharp_maps::FloorplanKind;
 use sharp_space::Seed;
-use sharp_space::floorplan::FloorplanKind;
 
 use crate::device::ComputeDevice;
 use crate::labels::LabelSettings;
