@@ -41,7 +41,7 @@ impl DistanceField {
                 *cell = cell.min(run);
             }
         }
-        let mut line = Envelope::new(width + 2);
+        let mut line = LowerEnvelope::new(width + 2);
         for row in squared.chunks_exact_mut(width) {
             line.transform_row(row);
         }
@@ -99,13 +99,13 @@ impl DistanceField {
 }
 
 /// Lower envelope of parabolas over one row with a blocked cell at either side.
-struct Envelope {
+struct LowerEnvelope {
     heights: Vec<f32>,
     vertices: Vec<usize>,
     bounds: Vec<f32>,
 }
 
-impl Envelope {
+impl LowerEnvelope {
     fn new(len: usize) -> Self {
         Self { heights: vec![0.0; len], vertices: vec![0; len], bounds: vec![0.0; len + 1] }
     }
