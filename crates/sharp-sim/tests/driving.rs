@@ -402,7 +402,7 @@ fn episode(vehicle: &mut Vehicle<AnySim>, actions: u64) -> Vec<RobotState> {
     (0..actions)
         .map(|i| {
             let bearing = i as f64 * 2.4;
-            let offset = Vector::new(bearing.cos(), bearing.sin()) * 0.5 + Vector::new(0.4, 0.0);
+            let offset = Heading::new(bearing).unit() * 0.5 + Vector::new(0.4, 0.0);
             let waypoint = vehicle.state().pose.position + offset;
             vehicle.act(waypoint).after
         })
