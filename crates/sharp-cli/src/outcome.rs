@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 use sharp_maps::MapError;
-use sharp_plan::FileError;
+use sharp_plan::{FileError, SolveError};
 use sharp_sim::{NoiseError, RobotError};
 
 /// Exit codes of the command, the same for every subcommand.
@@ -99,6 +99,15 @@ impl From<NoiseError> for Failure {
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
         Self::new("FILE_INVALID", error)
+    }
+}
+
+impl From<SolveError> for Failure {
+    fn from(error: SolveError) -> Self {
+        match error {
+            SolveError::File(error) => error.into(),
+            error => Self::new("NO_FREE_SPACE", error.to_string()),
+        }
     }
 }
 

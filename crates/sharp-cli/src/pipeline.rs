@@ -1,34 +1,24 @@
-//! Lines 1 to 7 of Algorithm 1: regions, diagram and options of one map for one robot.
+//! The façade as the flags ask for it: regions, abstraction, library.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use sharp_drive::World;
-use sharp_options::{OptionKind, OptionSettings};
-use sharp_plan::{AbstractionFile, FORMAT, OptionLibrary, hash, map_hash};
-use sharp_rbvd::{CellMetric, Rbvd, RbvdSettings};
+use sharp_options::OptionKind;
+use sharp_plan::{
+    AbstractionFile, AbstractionSettings, FORMAT, Monitor, OptionLibrary, Phase, Sharp, hash, map_hash,
+};
+use sharp_rbvd::CellMetric;
 use sharp_regions::{
     GeometricDetector, GridDetector, Heatmap, ListDetector, NetworkDetector, RandomDetector, RegionCount,
     RegionPredictor,
 };
 use sharp_sim::{NoiseModel, RobotModel};
-use sharp_space::{Point, Region, RegionDetector, Seed};
+use sharp_space::{Detection, GridFrame, Point, RegionDetector, Seed};
 
 use crate::args::{AbstractionArgs, Kind, Learning, Metric};
 use crate::input::read_text;
 use crate::outcome::Failure;
-use crate::progress::Stopwatch;
-
-/// What the abstraction of one map consists of.
-#[derive(Debug)]
-pub(crate) struct Built {
-    /// Diagram and option settings, as they are kept in a file.
-    pub(crate) file: AbstractionFile,
-    /// Where the regions came from: net, geometric or a file.
-    pub(crate) source: String,
-    /// The heat map, unless the abstraction was loaded or the regions came from a file.
-    pub(crate) heatmap: Option<Heatmap>,
-}
 
 impl From<Kind> for OptionKind {
     fn from(kind: Kind) -> Self {
@@ -39,32 +29,37 @@ impl From<Kind> for OptionKind {
     }
 }
 
-/// The abstraction for `args`, from `cache` if it holds it, and kept there.
-pub(crate) fn abstraction(
-    world: &World,
+/// The robot of `world` as `args` ask for it, with its abstraction: from `cache` if it holds it, and kept there.
+pub(crate) fn sharp(
+    world: World,
     args: &AbstractionArgs,
     cache: Option<&Path>,
-    stopwatch: &mut Stopwatch,
-) -> Result<Built, Failure> {
+    monitor: &dyn Monitor,
+) -> Result<(Sharp, AbstractionFile), Failure> {
     let map = map_hash(&world.grid);
+    let mut settings = AbstractionSettings::new(&world);
+    if args.metric == Metric::Paper {
+        settings.metric = CellMetric::Euclidean;
+    }
+    let detector = detector(&world, &args.regions)?;
+    let sharp =
+        Sharp::new(world, detector).with_options(args.options.into()).with_abstraction_settings(settings);
     let path = cache.map(|folder| folder.join(cache_name(args)));
-    if let Some(path) = path.as_deref().filter(|path| path.exists()) {
-        stopwatch.enter("abstraction");
-        let file = AbstractionFile::load(path, &map)?;
-        stopwatch.stop();
-        return Ok(Built { source: file.regions.clone(), file, heatmap: None });
-    }
-    stopwatch.enter("regions");
-    let (heatmap, regions, source) = regions(world, &args.regions)?;
-    stopwatch.enter("abstraction");
-    let rbvd = diagram(world, &regions, args.metric)?;
-    let settings = option_settings(world);
-    let file = AbstractionFile::new(map, source.clone(), args.options.into(), settings, &rbvd);
-    if let Some(path) = path {
-        file.save(&path)?;
-    }
-    stopwatch.stop();
-    Ok(Built { file, source, heatmap })
+    let (sharp, file) = match path.as_deref().filter(|path| path.exists()) {
+        Some(path) => {
+            monitor.phase(Phase::Abstraction);
+            let file = AbstractionFile::load(path, &map)?;
+            (sharp.with_abstraction(file.abstraction(), &file.regions), file)
+        }
+        None => {
+            let mut sharp = sharp;
+            let file = sharp.abstraction_file(monitor)?;
+            path.map_or(Ok(()), |path| file.save(&path))?;
+            (sharp, file)
+        }
+    };
+    monitor.phase(Phase::Done);
+    Ok((sharp, file))
 }
 
 fn cache_name(args: &AbstractionArgs) -> String {
@@ -75,65 +70,44 @@ fn cache_name(args: &AbstractionArgs) -> String {
     format!("abstraction-{:?}-{:?}-{regions}.ron", args.options, args.metric).to_lowercase()
 }
 
-/// Critical regions as `choice` asks for them, with the name of their source.
-pub(crate) fn regions(
-    world: &World,
-    choice: &str,
-) -> Result<(Option<Heatmap>, Vec<Region>, String), Failure> {
-    let (grid, footprint) = (&world.grid, &world.robot.footprint);
+/// The detector of critical regions that `choice` names: one of ours, or a file of places.
+pub(crate) fn detector(world: &World, choice: &str) -> Result<Box<dyn RegionDetector>, Failure> {
     let network = || NetworkDetector::new(shipped(&world.robot));
     // As many regions as the network finds: what a predictor must beat.
     let count = || RegionCount::Like(Arc::new(network()));
-    let detection = match choice {
-        "net" => network().detect(grid, footprint),
-        "geometric" => GeometricDetector::default().detect(grid, footprint),
-        "random" => RandomDetector { count: count(), seed: Seed(1) }.detect(grid, footprint),
-        "grid" => GridDetector { count: count() }.detect(grid, footprint),
-        file => return Ok((None, regions_from_file(world, file)?, file.to_owned())),
-    };
-    let heatmap = detection.criticality.map(|values| Heatmap::from_values(*grid.frame(), values));
-    Ok((heatmap, detection.regions, detection.source))
+    Ok(match choice {
+        "net" => Box::new(network()),
+        "geometric" => Box::new(GeometricDetector::default()),
+        "random" => Box::new(RandomDetector { count: count(), seed: Seed(1) }),
+        "grid" => Box::new(GridDetector { count: count() }),
+        file => Box::new(places(world, file)?),
+    })
+}
+
+/// The places listed in `file`, each of which must have room for the robot.
+fn places(world: &World, file: &str) -> Result<ListDetector, Failure> {
+    let broken = |problem: String| Failure::new("REGIONS_INVALID", format!("{file}: {problem}"));
+    let text = read_text(file, "regions", "net, geometric, random, grid or a file")?;
+    let centers: Vec<(f64, f64)> = ron::from_str(&text).map_err(|error| broken(error.to_string()))?;
+    let places = centers.into_iter().map(|(x, y)| Point::new(x, y)).collect();
+    let detector = ListDetector::new(places).with_source(file);
+    detector.regions(&world.grid, &world.robot.footprint).map_err(|error| broken(error.to_string()))?;
+    Ok(detector)
+}
+
+/// What `choice` finds in the map of `world`.
+pub(crate) fn detect(world: &World, choice: &str) -> Result<Detection, Failure> {
+    Ok(detector(world, choice)?.detect(&world.grid, &world.robot.footprint))
+}
+
+/// The heat map of a detection, if the detector knows how critical each cell is.
+pub(crate) fn heatmap(frame: &GridFrame, detection: &Detection) -> Option<Heatmap> {
+    detection.criticality.clone().map(|values| Heatmap::from_values(*frame, values))
 }
 
 /// The shipped network for `robot`, or the one trained for the footprint nearest in width.
 pub(crate) fn shipped(robot: &RobotModel) -> RegionPredictor {
     RegionPredictor::shipped_for(&robot.footprint)
-}
-
-/// A region of one cell's neighbourhood around each centre listed in a file.
-fn regions_from_file(world: &World, file: &str) -> Result<Vec<Region>, Failure> {
-    let broken = |problem: String| Failure::new("REGIONS_INVALID", format!("{file}: {problem}"));
-    let text = read_text(file, "regions", "net, geometric, random, grid or a file")?;
-    let centers: Vec<(f64, f64)> = ron::from_str(&text).map_err(|error| broken(error.to_string()))?;
-    let places = centers.into_iter().map(|(x, y)| Point::new(x, y)).collect();
-    let found = ListDetector::new(places).regions(&world.grid, &world.robot.footprint);
-    found.map_err(|error| broken(error.to_string()))
-}
-
-/// How options are made for the robot of `world`.
-pub(crate) fn option_settings(world: &World) -> OptionSettings {
-    // A car has to round the corners of its plans within them.
-    let factor = if world.robot.can_turn_in_place() { 1.0 } else { 2.0 };
-    let mut settings = OptionSettings::default();
-    settings.endpoint_radius_m = factor * world.robot.goal_tolerance_m;
-    settings
-}
-
-/// How the diagram is built for the robot of `world`: half a cell is what distances may be wrong by.
-pub(crate) fn rbvd_settings(world: &World) -> RbvdSettings {
-    let resolution_m = world.grid.frame().resolution_m;
-    RbvdSettings::for_footprint(&world.robot.footprint, 0.5 * resolution_m, resolution_m)
-}
-
-/// The region-based Voronoi diagram of `regions`.
-pub(crate) fn diagram(world: &World, regions: &[Region], metric: Metric) -> Result<Rbvd, Failure> {
-    let mut settings = rbvd_settings(world);
-    if metric == Metric::Paper {
-        settings.metric = CellMetric::Euclidean;
-    }
-    Rbvd::build(world.geometry.clearance(), regions, &settings).map_err(|error| {
-        Failure::new("NO_FREE_SPACE", format!("map has no room for the {}: {error}", world.robot.name))
-    })
 }
 
 /// The library for `choice` ("none", a folder, or by default a cache folder), opened for this world.
@@ -151,7 +125,7 @@ pub(crate) fn library(
     Ok(OptionLibrary::open(&root, &library_key(world, noise, learning))?)
 }
 
-/// Options learnt in one world say nothing about another: the key names robot, noise, mode and format,
+/// Options learnt in one world say nothing about another: the key names robot, noise, method and format,
 /// and then the map.
 fn library_key(world: &World, noise: &NoiseModel, learning: Learning) -> String {
     let key = format!("{:?} {noise:?} {learning:?} {FORMAT}", world.robot);

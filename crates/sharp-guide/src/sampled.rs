@@ -1,7 +1,9 @@
 //! Guides by Learn and Link inside the option's cells: the paper's planner, and the last resort.
 
 use rand::RngExt;
-use sharp_motion::{FromCells, Outcome, Path, Query, ShortcutSettings, Steering, learn_and_link, shortcut};
+use sharp_motion::{
+    FromCells, MotionQuery, Path, PathOutcome, ShortcutSettings, Steering, learn_and_link, shortcut,
+};
 use sharp_space::{Cell, Heading, Point, Pose, Stream, Vector};
 
 use crate::context::{Attempt, CHECK_STEP_M, GuideContext};
@@ -55,18 +57,18 @@ fn sampled_path(
     let (steering, settings) = (&context.robot.steering, &context.settings.sampling);
     let outcome = learn_and_link(&query, &seeds, context, steering, &mut sampler, settings, rng);
     match outcome {
-        Outcome::Solved(path) => {
+        PathOutcome::Solved(path) => {
             let effort = ShortcutSettings { check_step_m: CHECK_STEP_M, ..ShortcutSettings::default() };
             Ok(shortcut(&path, context, steering, &effort, rng))
         }
-        Outcome::InvalidStart => Err(NoGuide::Footprint(query.start.position)),
-        Outcome::InvalidGoal => Err(NoGuide::Footprint(query.goal.position)),
-        Outcome::Exhausted { iterations } => Err(NoGuide::Exhausted { iterations }),
+        PathOutcome::InvalidStart => Err(NoGuide::Footprint(query.start.position)),
+        PathOutcome::InvalidGoal => Err(NoGuide::Footprint(query.goal.position)),
+        PathOutcome::Exhausted { iterations } => Err(NoGuide::Exhausted { iterations }),
     }
 }
 
 /// The ends with headings: the given ones, or along the attempt.
-fn query(context: &GuideContext<'_>, mask: &TraversableMask<'_>, way: &[Vector]) -> Query {
+fn query(context: &GuideContext<'_>, mask: &TraversableMask<'_>, way: &[Vector]) -> MotionQuery {
     let frame = mask.frame();
     let along = |a: Vector, b: Vector| Heading::of(frame.from_grid(b) - frame.from_grid(a));
     let (start, goal) = (context.request.start, context.request.goal);
@@ -76,7 +78,7 @@ fn query(context: &GuideContext<'_>, mask: &TraversableMask<'_>, way: &[Vector])
         start.heading.unwrap_or_else(|| context.fitting_or(start.position, along(way[0], way[near])));
     let arriving =
         goal.heading.unwrap_or_else(|| context.fitting_or(goal.position, along(way[last - near], way[last])));
-    Query { start: Pose::at(start.position, leaving), goal: Pose::at(goal.position, arriving) }
+    MotionQuery { start: Pose::at(start.position, leaving), goal: Pose::at(goal.position, arriving) }
 }
 
 /// The open cells that can be reached from `start`, in the order of a breadth-first search.

@@ -56,8 +56,8 @@ impl AbstractionSettings {
     #[must_use]
     pub fn new(world: &World) -> Self {
         let factor = if world.robot.can_turn_in_place() { 1.0 } else { CAR_ENDPOINT_FACTOR };
-        let endpoint_radius_m = factor * world.robot.goal_tolerance_m;
-        let options = OptionSettings { endpoint_radius_m, ..OptionSettings::default() };
+        let mut options = OptionSettings::default();
+        options.endpoint_radius_m = factor * world.robot.goal_tolerance_m;
         Self { metric: CellMetric::default(), options }
     }
 
@@ -69,8 +69,9 @@ impl AbstractionSettings {
         let resolution_m = world.grid.frame().resolution_m;
         // Half a cell is what distances may be wrong by.
         let margin_m = 0.5 * resolution_m;
-        let settings = RbvdSettings::for_footprint(&world.robot.footprint, margin_m, resolution_m);
-        Rbvd::build(world.geometry.clearance(), regions, &RbvdSettings { metric: self.metric, ..settings })
+        let mut settings = RbvdSettings::for_footprint(&world.robot.footprint, margin_m, resolution_m);
+        settings.metric = self.metric;
+        Rbvd::build(world.geometry.clearance(), regions, &settings)
     }
 }
 

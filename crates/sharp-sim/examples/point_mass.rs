@@ -9,22 +9,22 @@ use sharp_sim::{
     ActionSettings, NoiseModel, ObstacleMap, RobotModel, RobotState, Simulator, StepInfo, Vehicle,
     WheelCommand,
 };
-use sharp_space::{CollisionChecker, OccupancyGrid, Point, Pose, Seed, Vector};
+use sharp_space::{OccupancyGrid, Point, Pose, Seed, Vector};
 
 /// A body without inertia in its map.
 #[derive(Clone, Debug)]
-struct PointMass {
+struct PointRobot {
     map: Arc<ObstacleMap>,
     state: RobotState,
 }
 
-impl PointMass {
+impl PointRobot {
     fn new(map: Arc<ObstacleMap>, _: &RobotModel) -> Self {
         Self { state: RobotState::at_rest(map.frame().origin), map }
     }
 }
 
-impl Simulator for PointMass {
+impl Simulator for PointRobot {
     fn reset(&mut self, state: RobotState) {
         self.state = state;
     }
@@ -50,9 +50,9 @@ impl Simulator for PointMass {
 
 fn main() {
     let robot = RobotModel::husky();
-    assert_eq!(check_simulator(PointMass::new, &robot), Ok(()));
+    assert_eq!(check_simulator(PointRobot::new, &robot), Ok(()));
     let grid = OccupancyGrid::from_ascii(1.0, "......\n......\n......").expect("the drawing is sound");
-    let sim = PointMass::new(Arc::new(ObstacleMap::new(&grid, robot.footprint)), &robot);
+    let sim = PointRobot::new(Arc::new(ObstacleMap::new(&grid, robot.footprint)), &robot);
     let mut vehicle = Vehicle::new(sim, Arc::new(robot), NoiseModel::nominal(), ActionSettings::default());
     vehicle.reset(RobotState::at_rest(Pose::new(1.0, 1.5, 0.0)), Seed(1), 0);
     let reached =

@@ -1,6 +1,6 @@
 //! Exact contact tests, skipped while the robot cannot have come near anything.
 
-use sharp_space::{CollisionChecker, Pose};
+use sharp_space::Pose;
 
 use crate::obstacle_map::ObstacleMap;
 

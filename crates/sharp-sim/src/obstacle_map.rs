@@ -117,8 +117,6 @@ impl DiscCover {
 
 #[cfg(test)]
 mod tests {
-    use sharp_space::CollisionChecker;
-
     use super::*;
 
     #[test]

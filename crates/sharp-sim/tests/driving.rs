@@ -9,9 +9,7 @@ use sharp_sim::{
     ActionSettings, AnySim, KinematicSim, NoiseModel, ObstacleMap, PlanarSim, RobotModel, RobotState,
     Simulator, SimulatorKind, Vehicle, WheelCommand,
 };
-use sharp_space::{
-    CollisionChecker, GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Seed, Vector,
-};
+use sharp_space::{GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Seed, Vector};
 
 const DT_S: f64 = 1.0 / 60.0;
 const KINDS: [SimulatorKind; 2] = [SimulatorKind::Kinematic, SimulatorKind::Planar];

@@ -56,7 +56,7 @@ fn ridge(robot: &GuideRobot<'_>, query: &Query) -> Option<GuidePath> {
 /// By hybrid A*.
 fn searched(robot: &GuideRobot<'_>, query: &Query, goal_radius_m: f64) -> Option<GuidePath> {
     let settings = HybridSettings { goal_radius_m, ..HybridSettings::default() };
-    let query = sharp_motion::Query { start: query.start, goal: query.goal };
+    let query = sharp_motion::MotionQuery { start: query.start, goal: query.goal };
     let path = hybrid_astar(&query, robot.geometry, &robot.steering, &settings).path()?;
     as_guide(&path, &robot.steering)
 }

@@ -160,12 +160,12 @@ impl RrtController<'_> {
 
     fn plan(&mut self, start: Pose) -> Readiness {
         let Rrt { world, planner, query, settings, .. } = self.baseline;
-        let query = sharp_motion::Query { start, goal: query.goal };
+        let query = sharp_motion::MotionQuery { start, goal: query.goal };
         let mut sampler = Uniform { bounds: world.grid.frame().bounds() };
         let mut rng = self.seed.stream("plan", self.attempts);
         self.attempts += 1;
         let path = planner.robots(start).find_map(|GuideRobot { geometry, steering, .. }| {
-            let query = sharp_motion::Query { goal: fitting(geometry, query.goal)?, ..query };
+            let query = sharp_motion::MotionQuery { goal: fitting(geometry, query.goal)?, ..query };
             let path = rrt(&query, geometry, &steering, &mut sampler, settings, &mut rng).path()?;
             Some(shortcut(&path, geometry, &steering, &ShortcutSettings::default(), &mut rng))
         });

@@ -6,7 +6,7 @@ use sharp_plan::write_atomic;
 
 use crate::args::Abstract;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::progress::Stopwatch;
+use crate::progress::{SolveMonitor, Stopwatch, spinner};
 use crate::report::{AbstractReport, MapReport, SolveTimes};
 use crate::{geojson, input, pictures, pipeline};
 
@@ -15,28 +15,29 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
     stopwatch.enter("load");
     let map = input::map(&args.map)?;
     let world = World::new(map.grid.clone(), input::robot(&args.abstraction.robot)?);
-    let built = pipeline::abstraction(&world, &args.abstraction, None, &mut stopwatch)?;
-    let abstraction = built.file.abstraction();
-    let count = |kind| OptionSet::synthesize(&built.file.rbvd, kind, &built.file.options).options().len();
+    stopwatch.stop();
+    let monitor = SolveMonitor::new(stopwatch, None, spinner("building the abstraction"), None);
+    let (sharp, file) = pipeline::sharp(world, &args.abstraction, None, &monitor)?;
+    let (stopwatch, world) = (monitor.into_stopwatch(), sharp.world());
+    let abstraction = file.abstraction();
+    let count = |kind| OptionSet::synthesize(&file.rbvd, kind, &file.options).options().len();
 
-    built.file.save(&args.out.join("abstraction.ron"))?;
-    if let Some(heatmap) = &built.heatmap {
-        pictures::write(
-            &args.out,
-            "regions",
-            &pictures::regions(&map.grid, heatmap, &pictures::regions_of(&built.file.rbvd)),
-        )?;
+    file.save(&args.out.join("abstraction.ron"))?;
+    let heatmap = sharp.detection().and_then(|found| pipeline::heatmap(map.grid.frame(), found));
+    if let Some(heatmap) = &heatmap {
+        let regions = pictures::regions_of(&file.rbvd);
+        pictures::write(&args.out, "regions", &pictures::regions(&map.grid, heatmap, &regions))?;
     }
     pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
     let route = geojson::route(&abstraction, world.robot.max_speed_mps);
     write_atomic(&args.out.join("route.geojson"), route.as_bytes())?;
 
-    let rbvd = &built.file.rbvd;
+    let rbvd = &file.rbvd;
     let report = AbstractReport {
         schema: "sharp.abstract/1",
         map: MapReport::new(&map.name, &map.grid),
         robot: world.robot.name.clone(),
-        regions: built.source.clone(),
+        regions: file.regions.clone(),
         states: rbvd.len(),
         neighbors: rbvd.states().map(|state| rbvd.neighbors(state).len()).sum::<usize>() / 2,
         options_centroid: count(OptionKind::Centroid),

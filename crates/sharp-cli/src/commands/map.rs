@@ -2,13 +2,14 @@
 
 use serde::Serialize;
 use sharp_drive::World;
+use sharp_plan::AbstractionSettings;
 use sharp_rbvd::Rbvd;
 use sharp_space::Occupancy;
 
 use crate::args::Map;
+use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::report::MapReport;
-use crate::{input, pipeline};
 
 #[derive(Serialize)]
 struct Info {
@@ -79,7 +80,7 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
         Map::Check { map, robot } => {
             let map = input::map(map)?;
             let world = World::new(map.grid, input::robot(robot)?);
-            let rbvd = Rbvd::build(world.geometry.clearance(), &[], &pipeline::rbvd_settings(&world)).ok();
+            let rbvd = AbstractionSettings::new(&world).diagram(&world, &[]).ok();
             let check = Check {
                 schema: "sharp.map.check/1",
                 robot: world.robot.name.clone(),

@@ -10,19 +10,21 @@ use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 use sharp_drive::{Follower, OptionPolicy, OptionTask, Prior, ProfiledFollower, SuccessEstimate, World};
-use sharp_options::{OptionKind, OptionSet};
+use sharp_maps::{FloorplanKind, generate};
+use sharp_options::OptionKind;
 use sharp_plan::{
-    Abstraction, Query, RouteScenarios, TrainingRoute, prior_train_settings, training_routes, write_atomic,
+    Abstraction, AbstractionSettings, Query, RouteScenarios, SolveError, TrainingRoute, construct,
+    prior_train_settings, training_routes, write_atomic,
 };
+use sharp_regions::GeometricDetector;
 use sharp_rl::{Progress, TrainState, Trained, fine_tune, resume, train};
 use sharp_sim::{NoiseModel, RobotModel};
-use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{GridFrame, OccupancyGrid, Pose, Seed, Stream};
 
 use crate::args::{PriorCommand, PriorScore, PriorTrain};
 use crate::curves::CurveFolder;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::{input, pipeline, progress};
+use crate::{input, progress};
 
 /// Side of the maps, metres.
 const MAP_M: f64 = 15.0;
@@ -238,10 +240,11 @@ fn shrunk(grid: &OccupancyGrid) -> OccupancyGrid {
 }
 
 fn abstraction(world: &World, kind: OptionKind) -> Result<Abstraction, Failure> {
-    let (_, regions, _) = pipeline::regions(world, "geometric")?;
-    let rbvd = pipeline::diagram(world, &regions, crate::args::Metric::Geodesic)?;
-    let options = OptionSet::synthesize(&rbvd, kind, &pipeline::option_settings(world));
-    Ok(Abstraction { states: Arc::new(rbvd), options: Arc::new(options) })
+    let detector = GeometricDetector::default();
+    let family = kind.family().expect("one of ours");
+    let built = construct(world, &detector, family, &AbstractionSettings::new(world), &());
+    let robot = world.robot.name.clone();
+    Ok(built.map_err(|source| SolveError::NoRoom { robot, source })?.0)
 }
 
 /// A problem with room at both ends.

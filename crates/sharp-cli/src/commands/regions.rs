@@ -45,15 +45,16 @@ pub(crate) fn label_robot(robot: &RobotModel) -> LabelRobot {
 fn predict(args: &Abstract, json: bool) -> Result<Exit, Failure> {
     let map = input::map(&args.map)?;
     let world = World::new(map.grid, input::robot(&args.abstraction.robot)?);
-    let (heatmap, regions, source) = pipeline::regions(&world, &args.abstraction.regions)?;
-    if let Some(heatmap) = &heatmap {
-        pictures::write(&args.out, "regions", &pictures::regions(&world.grid, heatmap, &regions))?;
+    let found = pipeline::detect(&world, &args.abstraction.regions)?;
+    if let Some(heatmap) = pipeline::heatmap(world.grid.frame(), &found) {
+        let picture = pictures::regions(&world.grid, &heatmap, &found.regions);
+        pictures::write(&args.out, "regions", &picture)?;
     }
     let report = PredictReport {
         schema: "sharp.regions.predict/1",
         robot: world.robot.name.clone(),
-        source,
-        regions: regions.iter().map(|region| region_report(&world, region)).collect(),
+        source: found.source,
+        regions: found.regions.iter().map(|region| region_report(&world, region)).collect(),
     };
     write_atomic(&args.out.join("regions.json"), (to_json(&report) + "\n").as_bytes())?;
     if json {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 use sharp_drive::World;
+use sharp_maps::FloorplanKind;
 use sharp_maps::load_doors;
 use sharp_regions::{
     BLIND_RADIUS_M, ComputeDevice, DoorScore, HELD_OUT_KINDS, LabelRobot, Labels, RegionPredictor,
@@ -11,8 +12,7 @@ use sharp_regions::{
     grid_regions, predict_regions, random_regions, score_doors, score_regions, scoring_maps,
 };
 use sharp_sim::RobotModel;
-use sharp_space::floorplan::FloorplanKind;
-use sharp_space::{DistanceField, OccupancyGrid, Point, Region, Seed};
+use sharp_space::{Detection, DistanceField, OccupancyGrid, Point, Region, Seed};
 
 use crate::args::{MapArgs, RegionsScore, Unknown};
 use crate::commands::regions::label_robot;
@@ -215,7 +215,7 @@ fn at_doors(
     let (regions, source) = match &args.model {
         Some(file) => (with_model(&world, &model(file)?), file.display().to_string()),
         None => {
-            let (_, regions, source) = pipeline::regions(&world, &args.regions)?;
+            let Detection { regions, source, .. } = pipeline::detect(&world, &args.regions)?;
             (regions, source)
         }
     };

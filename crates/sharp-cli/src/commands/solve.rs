@@ -6,15 +6,14 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 use sharp_drive::World;
 use sharp_maps::MapFile;
-use sharp_plan::{Conditions, Method, Outcome, Plan, Problem, Query, Solution, solve, write_atomic};
+use sharp_plan::{AbstractionFile, Answer, Method, Plan, Sharp, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{Guide, Learning, Solve, Switch};
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::pipeline::{self, Built};
 use crate::progress::{SolveMonitor, Stopwatch, is_interrupted, spinner};
 use crate::report::{MapReport, Reuse, SolveReport, SolveTimes};
-use crate::{input, pictures};
+use crate::{input, pictures, pipeline};
 
 /// What solving gave: the report, and the plan if there is one.
 pub(crate) struct Solved {
@@ -53,53 +52,29 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     input::check_query(&world, &query)?;
     args.out.as_deref().map_or(Ok(()), input::check_out)?;
     let mut library = pipeline::library(args.library.as_deref(), &world, &noise, args.learning)?;
-    stopwatch.stop();
-
-    let cache = library.folder().map(Path::to_owned);
-    let built = pipeline::abstraction(&world, &args.abstraction, cache.as_deref(), &mut stopwatch)?;
-    let abstraction = built.file.abstraction();
-    let mut method = Method::by_name(args.learning.name()).expect("every word names a method");
-    method.search.cost_update = args.cost_update == Switch::On;
-    method.failure_cost_s = args.failure_cost;
-    if args.guide == Guide::Paper {
-        method = method.with_learn_and_link();
-    }
-    let curves = args.tensorboard.as_deref();
-    let monitor = SolveMonitor::new(stopwatch, time_limit, spinner, curves);
     // Hours of training are kept at once; they are the same whatever else the library holds.
     if args.learning != Learning::Paper {
         library.defer();
     }
-    let conditions = Conditions::new(&world, noise.clone());
-    let problem = Problem {
-        world: &world,
-        method: &method,
-        conditions: &conditions,
-        query,
-        seed: Seed(seed),
-        monitor: &monitor,
-    };
-    let outcome = solve(&problem, &abstraction, &mut library)?;
+    stopwatch.stop();
+
+    let monitor = SolveMonitor::new(stopwatch, time_limit, spinner, args.tensorboard.as_deref());
+    let cache = library.folder().map(Path::to_owned);
+    let (sharp, file) = pipeline::sharp(world, &args.abstraction, cache.as_deref(), &monitor)?;
+    let mut sharp =
+        sharp.with_method(method(args)).with_noise(noise).with_library(library).with_seed(Seed(seed));
+    let answer = sharp.solve(query, &monitor)?;
     let stopwatch = monitor.into_stopwatch();
 
-    let report = blank_report(args, seed, &map, &world, &built, abstraction.options.options().len());
-    let plan = |solution: Solution| Plan {
-        world: world.clone(),
-        abstraction: abstraction.clone(),
-        noise: noise.clone(),
-        method: method.clone(),
-        seed: Seed(seed),
-        solution,
-    };
-    let (mut report, plan) = match outcome {
-        Outcome::Solved(solution) => {
-            let plan = plan(*solution);
-            let folder = plan_folder(args, &map, &world)?;
+    let report = blank_report(args, seed, &map, &mut sharp, &file)?;
+    let (mut report, plan) = match answer {
+        Answer::Solved(plan) => {
+            let folder = plan_folder(args, &map, &plan.world)?;
             let report = report.with_plan(&plan, &folder);
-            (report, Some((plan, folder)))
+            (report, Some((*plan, folder)))
         }
-        Outcome::NoPlan(reason) => (SolveReport { status: "no_plan", reason: Some(reason), ..report }, None),
-        Outcome::Stopped => (
+        Answer::NoPlan(reason) => (SolveReport { status: "no_plan", reason: Some(reason), ..report }, None),
+        Answer::Stopped => (
             SolveReport {
                 status: "timeout",
                 reason: Some("stopped before a plan was verified; what was learnt is kept".to_owned()),
@@ -110,9 +85,9 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     };
     report.time_s = SolveTimes::from(&stopwatch);
     let plan = plan
-        .map(|(plan, folder)| write_plan(&plan, &folder, &built, &query, &report).map(|()| plan))
+        .map(|(plan, folder)| write_plan(&plan, &folder, (&sharp, &file), &report).map(|()| plan))
         .transpose()?;
-    library.save()?;
+    sharp.library_mut().save()?;
     Ok(Solved { report, plan })
 }
 
@@ -123,34 +98,42 @@ fn limit(seconds: f64) -> Result<Duration, Failure> {
     })
 }
 
+/// How the flags want the problem solved.
+fn method(args: &Solve) -> Method {
+    let mut method = Method::by_name(args.learning.name()).expect("every word names a method");
+    method.search.cost_update = args.cost_update == Switch::On;
+    method.failure_cost_s = args.failure_cost;
+    if args.guide == Guide::Paper { method.with_learn_and_link() } else { method }
+}
+
 fn blank_report(
     args: &Solve,
     seed: u64,
     map: &MapFile,
-    world: &World,
-    built: &Built,
-    options_available: usize,
-) -> SolveReport {
-    SolveReport {
+    sharp: &mut Sharp,
+    file: &AbstractionFile,
+) -> Result<SolveReport, Failure> {
+    let options_available = sharp.abstraction(&())?.options.options().len();
+    Ok(SolveReport {
         schema: "sharp.solve/1",
         status: "no_plan",
         reason: None,
-        robot: world.robot.name.clone(),
-        options: built.file.kind.name(),
+        robot: sharp.world().robot.name.clone(),
+        options: file.kind.name(),
         learning: args.learning.name(),
         cost_update: args.cost_update.name(),
         noise: args.noise.clone(),
         seed,
         map: MapReport::new(&map.name, &map.grid),
-        regions: built.source.clone(),
-        states: built.file.rbvd.len(),
+        regions: file.regions.clone(),
+        states: file.rbvd.len(),
         options_available,
         plan: vec![],
         reuse: Reuse { uses: 0, reused: 0 },
         predicted: None,
         time_s: SolveTimes::default(),
         plan_dir: None,
-    }
+    })
 }
 
 /// The folder asked for, or a fresh one.
@@ -171,21 +154,19 @@ fn plan_folder(args: &Solve, map: &MapFile, world: &World) -> Result<PathBuf, Fa
 fn write_plan(
     plan: &Plan,
     folder: &Path,
-    built: &Built,
-    query: &Query,
+    (sharp, file): (&Sharp, &AbstractionFile),
     report: &SolveReport,
 ) -> Result<(), Failure> {
-    plan.save(folder, &built.file)?;
-    sharp_maps::save_ros(&plan.world.grid, &folder.join("map.yaml"))?;
-    if let Some(heatmap) = &built.heatmap {
-        pictures::write(
-            folder,
-            "regions",
-            &pictures::regions(&plan.world.grid, heatmap, &pictures::regions_of(&built.file.rbvd)),
-        )?;
+    plan.save(folder, file)?;
+    let grid = &plan.world.grid;
+    sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
+    let heatmap = sharp.detection().and_then(|found| pipeline::heatmap(grid.frame(), found));
+    if let Some(heatmap) = &heatmap {
+        let regions = pictures::regions_of(&file.rbvd);
+        pictures::write(folder, "regions", &pictures::regions(grid, heatmap, &regions))?;
     }
-    pictures::write(folder, "abstraction", &pictures::abstraction(&plan.world.grid, &plan.abstraction))?;
-    pictures::write(folder, "plan", &pictures::plan(plan, query, &[]))?;
+    pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction))?;
+    pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[]))?;
     write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;
     Ok(())
 }
