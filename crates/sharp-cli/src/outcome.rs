@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
+use sharp_draw::PngError;
 use sharp_maps::MapError;
 use sharp_plan::FileError;
 use sharp_sim::{NoiseError, RobotError};
@@ -99,6 +100,12 @@ impl From<NoiseError> for Failure {
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
         Self::new("FILE_INVALID", error)
+    }
+}
+
+impl From<PngError> for Failure {
+    fn from(error: PngError) -> Self {
+        Self::new("FAILED", error)
     }
 }
 

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
+use sharp_draw::{Scene, Trajectory, svg_to_png};
 use sharp_plan::{Abstraction, Episode, EpisodeEnd, Plan, Query, write_atomic};
 use sharp_rbvd::Rbvd;
 use sharp_regions::Heatmap;
 use sharp_space::{OccupancyGrid, Point, Region};
 
 use crate::outcome::Failure;
-use crate::render::{Drive, Scene, svg_to_png};
 
 /// Longer side of the PNG beside each SVG, pixels.
 const PNG_SIDE_PX: u32 = 1200;
@@ -22,7 +22,7 @@ pub(crate) fn write(folder: &Path, name: &str, svg: &str) -> Result<(), Failure>
 
 /// The heat map of criticality with the outlines of the regions made from it.
 pub(crate) fn regions(grid: &OccupancyGrid, heatmap: &Heatmap, regions: &[Region]) -> String {
-    Scene::new(grid).heat_map(heatmap.values()).regions(regions).to_svg()
+    Scene::new(grid).heat_map(heatmap.values(), "criticality").regions(regions).to_svg()
 }
 
 /// The regions of all states.
@@ -61,16 +61,19 @@ pub(crate) fn plan(plan: &Plan, query: &Query, episodes: &[Episode]) -> String {
         .map(|planned| planned.leg.guide.poses().iter().map(|pose| pose.position).collect())
         .collect();
     let targets: Vec<Point> = legs.iter().map(|planned| planned.leg.target.center()).collect();
-    let drives: Vec<Drive> = episodes
+    let trajectories: Vec<Trajectory> = episodes
         .iter()
-        .map(|episode| Drive { poses: episode.trace.clone(), failed: episode.end != EpisodeEnd::Reached })
+        .map(|episode| Trajectory {
+            poses: episode.trace.clone(),
+            failed: episode.end != EpisodeEnd::Reached,
+        })
         .collect();
     Scene::new(&plan.workspace.grid)
         .states(&|cell| rbvd.state_of(cell).map(|state| state.0))
         .faded()
         .endpoints(&targets, plan.workspace.robot.goal_tolerance_m)
         .guides(&guides)
-        .drives(&drives, plan.workspace.robot.footprint)
+        .trajectories(&trajectories, plan.workspace.robot.footprint)
         .problem(query.start, query.goal)
         .to_svg()
 }
