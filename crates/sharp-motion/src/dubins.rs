@@ -132,7 +132,7 @@ impl DubinsProblem {
     /// If the straight has no length, its direction is rounding noise. Then the last arc makes the whole
     /// turn.
     fn straight(&self, x: f64, y: f64) -> (f64, f64) {
-        let p = x.hypot(y);
+        let p = trig::hypot(x, y);
         if p > 1e-7 { (p, trig::atan2(y, x)) } else { (0.0, self.alpha) }
     }
 

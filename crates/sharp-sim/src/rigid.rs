@@ -198,7 +198,10 @@ impl RigidBodies {
                 let curvature = trig::tan(state.steer_rad) / wheelbase_m;
                 let ahead = 1.0 - curvature * contact.y;
                 let left = curvature * (contact.x + wheelbase_m / 2.0);
-                WheelRoll { speed_mps: speed_mps * ahead.hypot(left), angle_rad: trig::atan2(left, ahead) }
+                WheelRoll {
+                    speed_mps: speed_mps * trig::hypot(ahead, left),
+                    angle_rad: trig::atan2(left, ahead),
+                }
             }
         }
     }
