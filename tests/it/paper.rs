@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use sharp_guide::{Abstraction, GuidePath, GuideSettings, OptionGuide, Robot, Steering};
+use sharp_maps::FloorplanKind;
 use sharp_options::{AllowedRule, EndpointId, OptionKind, OptionSpec};
 use sharp_plan::{Leg, LegId, OptionGraph, Planner, Query, SearchSettings};
 use sharp_rbvd::{Rbvd, StateId};
 use sharp_sim::RobotModel;
-use sharp_space::floorplan::FloorplanKind;
 use sharp_space::{Pose, Seed};
 
 use crate::worlds::World;

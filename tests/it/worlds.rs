@@ -4,12 +4,12 @@
 use std::sync::Arc;
 
 use rand::RngExt;
+use sharp_maps::{FloorplanKind, generate};
 use sharp_options::{OptionKind, OptionSet, OptionSettings};
 use sharp_plan::{Abstraction, Query, Workspace};
 use sharp_rbvd::{Rbvd, RbvdSettings};
 use sharp_regions::{GeometricSettings, geometric_regions};
 use sharp_sim::RobotModel;
-use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{Cell, DistanceField, OccupancyGrid, Pose, Region, RegionId, Seed, Stream};
 
 /// A map, a robot and the options between the map's regions.

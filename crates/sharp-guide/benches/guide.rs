@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use sharp_guide::{GuideEnd, GuidePlanner, GuideRequest, GuideSettings, Steering, plan_guide};
-use sharp_space::floorplan::{FloorplanKind, generate};
+use sharp_maps::{FloorplanKind, generate};
 use sharp_space::{Footprint, FootprintChecker, Point, Seed};
 
 fn requests(checker: &FootprintChecker) -> Vec<(GuideEnd, GuideEnd)> {

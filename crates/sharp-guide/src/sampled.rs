@@ -1,7 +1,9 @@
 //! Guides by Learn and Link inside the option's cells: the paper's planner, and the last resort.
 
 use rand::RngExt;
-use sharp_motion::{FromCells, Outcome, Path, Query, ShortcutSettings, Steering, learn_and_link, shortcut};
+use sharp_motion::{
+    FromCells, MotionQuery, Path, PathOutcome, ShortcutSettings, Steering, learn_and_link, shortcut,
+};
 use sharp_space::{Cell, Heading, Point, Pose, Stream, Vector};
 
 use crate::floor::Floor;
@@ -55,18 +57,18 @@ fn sampled_path(
     let (steering, settings) = (bench.steering, &bench.settings.sampling);
     let outcome = learn_and_link(&query, &seeds, bench, steering, &mut sampler, settings, rng);
     match outcome {
-        Outcome::Solved(path) => {
+        PathOutcome::Solved(path) => {
             let effort = ShortcutSettings { check_step_m: CHECK_STEP_M, ..ShortcutSettings::default() };
             Ok(shortcut(&path, bench, steering, &effort, rng))
         }
-        Outcome::InvalidStart => Err(NoGuide::Footprint(query.start.position)),
-        Outcome::InvalidGoal => Err(NoGuide::Footprint(query.goal.position)),
-        Outcome::Exhausted { iterations } => Err(NoGuide::Exhausted { iterations }),
+        PathOutcome::InvalidStart => Err(NoGuide::Footprint(query.start.position)),
+        PathOutcome::InvalidGoal => Err(NoGuide::Footprint(query.goal.position)),
+        PathOutcome::Exhausted { iterations } => Err(NoGuide::Exhausted { iterations }),
     }
 }
 
 /// The ends with headings: the given ones, or along the draft.
-fn query(bench: &Workbench<'_>, floor: &Floor<'_>, way: &[Vector]) -> Query {
+fn query(bench: &Workbench<'_>, floor: &Floor<'_>, way: &[Vector]) -> MotionQuery {
     let frame = floor.frame();
     let along = |a: Vector, b: Vector| Heading::of(frame.from_grid(b) - frame.from_grid(a));
     let (start, goal) = (bench.request.start, bench.request.goal);
@@ -75,7 +77,7 @@ fn query(bench: &Workbench<'_>, floor: &Floor<'_>, way: &[Vector]) -> Query {
     let leaving = start.heading.unwrap_or_else(|| bench.fitting_or(start.position, along(way[0], way[near])));
     let arriving =
         goal.heading.unwrap_or_else(|| bench.fitting_or(goal.position, along(way[last - near], way[last])));
-    Query { start: Pose::at(start.position, leaving), goal: Pose::at(goal.position, arriving) }
+    MotionQuery { start: Pose::at(start.position, leaving), goal: Pose::at(goal.position, arriving) }
 }
 
 /// The open cells that can be reached from `start`, in the order of a breadth-first search.

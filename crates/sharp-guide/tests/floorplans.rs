@@ -4,7 +4,7 @@ use rand::RngExt;
 use sharp_guide::{
     GuideEnd, GuidePath, GuidePlanner, GuideRequest, GuideSettings, NoGuide, Steering, plan_guide,
 };
-use sharp_space::floorplan::{FloorplanKind, generate};
+use sharp_maps::{FloorplanKind, generate};
 use sharp_space::{
     Cell, CollisionChecker, Footprint, FootprintChecker, GridFrame, Heading, Point, Pose, Seed,
 };

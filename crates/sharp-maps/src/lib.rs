@@ -1,11 +1,10 @@
-//! Reads and writes map files.
+//! Reads, writes and generates maps.
 //!
-//! [`load`] takes what a user types: a ROS map (YAML and image), a `MovingAI` map, a plain image, a
-//! drawn floor plan, or the letter of one of the project's own environments. It gives a
-//! [`MapFile`]: an occupancy grid, and for the own environments the [`Problem`]s posed in them.
-//! [`save_ros`] writes the files that ROS's map saver would. Whatever is broken becomes a
-//! [`MapError`] that names the file, the field, its value and what would be right; sizes are
-//! checked before memory is spent on them.
+//! [`load`] takes what a user types: a ROS map (YAML and image), a `MovingAI` map, a plain image, a drawn
+//! floor plan, or the letter of one of the project's own environments. It gives a [`MapFile`]: an occupancy
+//! grid, and for the own environments the [`Problem`]s posed in them. [`save_ros`] writes the files that
+//! ROS's map saver would. A broken file gives a [`MapError`] that names the file, the field, its value and
+//! what is allowed. Sizes are checked before memory is spent on them. [`generate`] draws random floor plans.
 //!
 //! ```
 //! use sharp_maps::{LoadOptions, load};
@@ -15,24 +14,11 @@
 //! assert_eq!(map.problems.len(), 5);
 //! ```
 
-mod doors;
-mod error;
-mod files;
-mod floor_plan;
-mod load;
-mod movingai;
-mod named;
-mod picture;
-mod ros;
-mod save;
+mod generate;
 
-#[cfg(test)]
-mod drivable;
-#[cfg(test)]
-mod statistics;
+#[cfg(feature = "files")]
+mod formats;
 
-pub use doors::{Door, load_doors};
-pub use error::MapError;
-pub use load::{LoadOptions, MapFile, Problem, load};
-pub use named::named_maps;
-pub use save::save_ros;
+#[cfg(feature = "files")]
+pub use formats::{Door, LoadOptions, MapError, MapFile, Problem, load, load_doors, named_maps, save_ros};
+pub use generate::{FloorplanKind, generate, turned_from};

@@ -1,7 +1,9 @@
 //! How long does one labelling query take: 15 m map, ends 5 to 8 m apart?
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use sharp_motion::{Algorithm, MotionPlanner, Outcome, Planner, Query, RrtSettings, Steering};
+use sharp_motion::{
+    Algorithm, MotionPlanner, MotionQuery, PathOutcome, RrtSettings, SamplingPlanner, Steering,
+};
 use sharp_space::{CollisionChecker, Footprint, FootprintChecker, OccupancyGrid, Pose, Seed, Stream};
 
 /// Four rooms of 7 m with doors of 1.2 m, cells of 0.1 m.
@@ -20,12 +22,12 @@ fn rooms() -> OccupancyGrid {
     OccupancyGrid::from_ascii(0.1, &drawing).expect("a sound drawing")
 }
 
-fn queries(checker: &FootprintChecker, rng: &mut Stream) -> Vec<Query> {
+fn queries(checker: &FootprintChecker, rng: &mut Stream) -> Vec<MotionQuery> {
     use rand::RngExt;
     let mut pose =
         |_| Pose::new(15.0 * rng.random::<f64>(), 15.0 * rng.random::<f64>(), 6.3 * rng.random::<f64>());
     let free: Vec<Pose> = (0..4000).map(&mut pose).filter(|&pose| checker.is_free(pose)).collect();
-    let pairs = free.chunks_exact(2).map(|pair| Query { start: pair[0], goal: pair[1] });
+    let pairs = free.chunks_exact(2).map(|pair| MotionQuery { start: pair[0], goal: pair[1] });
     pairs.filter(|q| (5.0..8.0).contains(&q.start.distance_m(&q.goal))).take(50).collect()
 }
 
@@ -43,7 +45,7 @@ fn bench(c: &mut Criterion) {
             ("rrt", Algorithm::Rrt),
             ("learn_and_link", Algorithm::LearnAndLink { seeds: vec![] }),
         ] {
-            let planner = Planner {
+            let planner = SamplingPlanner {
                 algorithm,
                 steering,
                 bounds: grid.frame().bounds(),
@@ -55,7 +57,7 @@ fn bench(c: &mut Criterion) {
                     &checker,
                     &mut Seed(2).stream("plan", i as u64),
                 );
-                matches!(outcome, Outcome::Solved(_))
+                matches!(outcome, PathOutcome::Solved(_))
             };
             let solved = (0..queries.len()).filter(|&i| solve(i)).count();
             // A car that faces a wall has no way out, and one tree alone often misses a goal near a wall.

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use sharp_space::Pose;
+use sharp_space::{Pose, trig};
 
 use crate::maneuver::Primitive;
 
@@ -13,15 +13,15 @@ use crate::maneuver::Primitive;
 pub(crate) fn shortest(from: Pose, to: Pose, radius_m: f64) -> [Primitive; 3] {
     debug_assert!(radius_m > 0.0, "turning radius is {radius_m} m, must be positive");
     let local = from.to_local(to.position) / radius_m;
-    let bearing = local.y.atan2(local.x);
-    let problem = Problem::new(
+    let bearing = trig::atan2(local.y, local.x);
+    let problem = DubinsProblem::new(
         local.norm(),
         positive_angle(-bearing),
         positive_angle(from.heading.turn_to(to.heading) - bearing),
     );
     let words = [problem.lsl(), problem.rsr(), problem.lsr(), problem.rsl(), problem.rlr(), problem.lrl()];
     let shortest = words.into_iter().flatten().reduce(|best, word| {
-        // A tie within rounding must not depend on the platform's last digit.
+        // Two words of equal length differ by rounding only; the first one must win all the same.
         if length(&word) < length(&best) - 1e-9 { word } else { best }
     });
     shortest
@@ -30,24 +30,25 @@ pub(crate) fn shortest(from: Pose, to: Pose, radius_m: f64) -> [Primitive; 3] {
 }
 
 /// Side (+1 left, 0 straight, −1 right) and size (radians, or radii for a straight) of each piece.
-type Word = [(f64, f64); 3];
+type DubinsWord = [(f64, f64); 3];
 
 const LEFT: f64 = 1.0;
 const STRAIGHT: f64 = 0.0;
 const RIGHT: f64 = -1.0;
 
-fn length(word: &Word) -> f64 {
+fn length(word: &DubinsWord) -> f64 {
     word.iter().map(|(_, size)| size).sum()
 }
 
-/// The angle in [0, 2π); a hair below a full turn is none, or rounding would add a loop.
+/// The angle in [0, 2π). An angle just below a full turn counts as zero, because rounding would otherwise add
+/// a loop.
 fn positive_angle(angle_rad: f64) -> f64 {
     let angle = angle_rad.rem_euclid(TAU);
     if TAU - angle < 1e-8 { 0.0 } else { angle }
 }
 
 /// Both poses in the frame whose x axis points from one to the other, lengths in turning radii.
-struct Problem {
+struct DubinsProblem {
     d: f64,
     alpha: f64,
     beta: f64,
@@ -58,13 +59,13 @@ struct Problem {
     cos_ab: f64,
 }
 
-impl Problem {
+impl DubinsProblem {
     fn new(d: f64, alpha: f64, beta: f64) -> Self {
-        let ((sin_a, cos_a), (sin_b, cos_b)) = (alpha.sin_cos(), beta.sin_cos());
-        Self { d, alpha, beta, sin_a, sin_b, cos_a, cos_b, cos_ab: (alpha - beta).cos() }
+        let ((sin_a, cos_a), (sin_b, cos_b)) = (trig::sin_cos(alpha), trig::sin_cos(beta));
+        Self { d, alpha, beta, sin_a, sin_b, cos_a, cos_b, cos_ab: trig::cos(alpha - beta) }
     }
 
-    fn lsl(&self) -> Option<Word> {
+    fn lsl(&self) -> Option<DubinsWord> {
         let x = self.d + self.sin_a - self.sin_b;
         let (p, angle) = self.straight(x, self.cos_b - self.cos_a);
         Some(word(
@@ -75,7 +76,7 @@ impl Problem {
         ))
     }
 
-    fn rsr(&self) -> Option<Word> {
+    fn rsr(&self) -> Option<DubinsWord> {
         let x = self.d - self.sin_a + self.sin_b;
         let (p, angle) = self.straight(x, self.cos_a - self.cos_b);
         Some(word(
@@ -86,11 +87,11 @@ impl Problem {
         ))
     }
 
-    fn lsr(&self) -> Option<Word> {
+    fn lsr(&self) -> Option<DubinsWord> {
         let x = self.d + self.sin_a + self.sin_b;
         let squared = self.d * self.d - 2.0 + 2.0 * self.cos_ab + 2.0 * self.d * (self.sin_a + self.sin_b);
         let p = (squared >= 0.0).then(|| squared.sqrt())?;
-        let angle = (-self.cos_a - self.cos_b).atan2(x) - (-2.0_f64).atan2(p);
+        let angle = trig::atan2(-self.cos_a - self.cos_b, x) - trig::atan2(-2.0, p);
         Some(word(
             [LEFT, STRAIGHT, RIGHT],
             positive_angle(angle - self.alpha),
@@ -99,11 +100,11 @@ impl Problem {
         ))
     }
 
-    fn rsl(&self) -> Option<Word> {
+    fn rsl(&self) -> Option<DubinsWord> {
         let x = self.d - self.sin_a - self.sin_b;
         let squared = self.d * self.d - 2.0 + 2.0 * self.cos_ab - 2.0 * self.d * (self.sin_a + self.sin_b);
         let p = (squared >= 0.0).then(|| squared.sqrt())?;
-        let angle = (self.cos_a + self.cos_b).atan2(x) - 2.0_f64.atan2(p);
+        let angle = trig::atan2(self.cos_a + self.cos_b, x) - trig::atan2(2.0, p);
         Some(word(
             [RIGHT, STRAIGHT, LEFT],
             positive_angle(self.alpha - angle),
@@ -112,36 +113,37 @@ impl Problem {
         ))
     }
 
-    fn rlr(&self) -> Option<Word> {
+    fn rlr(&self) -> Option<DubinsWord> {
         let x = self.d - self.sin_a + self.sin_b;
         let p = self.middle_turn(self.sin_a - self.sin_b)?;
-        let t = positive_angle(self.alpha - (self.cos_a - self.cos_b).atan2(x) + p / 2.0);
+        let t = positive_angle(self.alpha - trig::atan2(self.cos_a - self.cos_b, x) + p / 2.0);
         Some(word([RIGHT, LEFT, RIGHT], t, p, positive_angle(self.alpha - self.beta - t + p)))
     }
 
-    fn lrl(&self) -> Option<Word> {
+    fn lrl(&self) -> Option<DubinsWord> {
         let x = self.d + self.sin_a - self.sin_b;
         let p = self.middle_turn(self.sin_b - self.sin_a)?;
-        let t = positive_angle(-self.alpha - (self.cos_a - self.cos_b).atan2(x) + p / 2.0);
+        let t = positive_angle(-self.alpha - trig::atan2(self.cos_a - self.cos_b, x) + p / 2.0);
         Some(word([LEFT, RIGHT, LEFT], t, p, positive_angle(self.beta - self.alpha - t + p)))
     }
 
     /// Length and direction of the straight between two circles on the same side.
     ///
-    /// Without a straight its direction is rounding noise, so the whole turn goes to the last arc.
+    /// If the straight has no length, its direction is rounding noise. Then the last arc makes the whole
+    /// turn.
     fn straight(&self, x: f64, y: f64) -> (f64, f64) {
         let p = x.hypot(y);
-        if p > 1e-7 { (p, y.atan2(x)) } else { (0.0, self.alpha) }
+        if p > 1e-7 { (p, trig::atan2(y, x)) } else { (0.0, self.alpha) }
     }
 
-    /// The long turn between two equal ones, or none where the outer circles are too far apart.
+    /// The long turn between two equal ones. `None` if the outer circles are too far apart.
     fn middle_turn(&self, sin_difference: f64) -> Option<f64> {
         let cos = (6.0 - self.d * self.d + 2.0 * self.cos_ab + 2.0 * self.d * sin_difference) / 8.0;
-        (cos.abs() <= 1.0).then(|| positive_angle(TAU - cos.acos()))
+        (cos.abs() <= 1.0).then(|| positive_angle(TAU - trig::acos(cos)))
     }
 }
 
-fn word(sides: [f64; 3], t: f64, p: f64, q: f64) -> Word {
+fn word(sides: [f64; 3], t: f64, p: f64, q: f64) -> DubinsWord {
     [(sides[0], t), (sides[1], p), (sides[2], q)]
 }
 

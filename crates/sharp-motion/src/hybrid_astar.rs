@@ -1,24 +1,24 @@
 //! Hybrid A* (Dolgov, Thrun, Montemerlo and Diebel 2010): search over driven arcs on a lattice.
 //!
-//! Poses stay exact, but of all that fall into the same bin of place and heading only the cheapest
-//! goes on. The outline is tested along every arc, and a metre near a wall costs more than one with
-//! room. What remains is estimated by the cheapest way over the cells that are wide enough. The
-//! paper has no such planner: it serves the baselines that drive a planned path.
+//! Poses stay exact, but only the cheapest pose in each bin of position and heading is expanded. The outline
+//! is tested along every arc, and a metre near a wall costs more than one with clearance. The heuristic is
+//! the cheapest path over the cells with enough clearance. The paper has no such planner. The baselines that
+//! follow a planned path use it.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::f64::consts::TAU;
 
-use sharp_space::{Cell, CollisionChecker, FootprintChecker, Point, Pose};
+use sharp_space::{Cell, Point, Pose, RobotGeometry};
 
 use crate::maneuver::Primitive;
 use crate::path::Path;
-use crate::query::{Budget, Outcome, Query};
+use crate::query::{Budget, MotionQuery, PathOutcome};
 use crate::steering::Steering;
 
-/// A metre of bend costs this much more than a straight one: the path does not sway without a reason.
+/// Cost of a metre in a bend, as a multiple of a straight metre: it keeps the path from swaying.
 const BEND_PRICE: f64 = 1.1;
-/// Marks a bin without a node.
+/// Stands for no node.
 const NONE: u32 = u32::MAX;
 
 /// The settings of [`hybrid_astar`].
@@ -34,9 +34,9 @@ pub struct HybridSettings {
     pub headings: usize,
     /// The tightest bend, metres; a robot that cannot drive it gets its own radius.
     pub bend_m: f64,
-    /// How much more a metre with no room to spare costs than one with comfortable room.
+    /// How much more a metre without clearance costs than one with comfortable clearance.
     pub clearance_weight: f64,
-    /// Room beyond the inscribed radius that is comfortable, metres.
+    /// Clearance beyond the inscribed radius that is comfortable, metres.
     pub comfort_m: f64,
     /// The goal counts as reached within this distance; its heading is free.
     pub goal_radius_m: f64,
@@ -63,34 +63,34 @@ impl Default for HybridSettings {
 /// The cheapest path on the lattice from the query's start to the goal's position.
 #[must_use]
 pub fn hybrid_astar(
-    query: &Query,
-    checker: &FootprintChecker,
+    query: &MotionQuery,
+    checker: &dyn RobotGeometry,
     steering: &Steering,
     settings: &HybridSettings,
-) -> Outcome {
+) -> PathOutcome {
     if !checker.is_free(query.start) {
-        return Outcome::InvalidStart;
+        return PathOutcome::InvalidStart;
     }
     let Some(rest_m) = cost_to_go_m(checker, query.goal.position, settings) else {
-        return Outcome::InvalidGoal;
+        return PathOutcome::InvalidGoal;
     };
-    let mut search = Search::new(checker, &rest_m, settings);
+    let mut search = LatticeSearch::new(checker, &rest_m, settings);
     let moves = moves(steering, settings);
     search.push(query.start, 0.0, (NONE, Primitive::default()));
     for iterations in 0..settings.budget.iterations {
-        let Some(node) = search.pop() else { return Outcome::Exhausted { iterations } };
+        let Some(node) = search.pop() else { return PathOutcome::Exhausted { iterations } };
         let pose = search.nodes[node as usize].pose;
         if (pose.position - query.goal.position).norm() <= settings.goal_radius_m {
-            return Outcome::Solved(search.trace(node));
+            return PathOutcome::Solved(search.trace(node));
         }
         moves.iter().for_each(|&primitive| search.expand(node, primitive));
     }
-    Outcome::Exhausted { iterations: settings.budget.iterations }
+    PathOutcome::Exhausted { iterations: settings.budget.iterations }
 }
 
 /// Straight on, two bends to either side, and for a robot that can: turns in place by one bin.
 fn moves(steering: &Steering, settings: &HybridSettings) -> Vec<Primitive> {
-    // A tenth to spare: a robot that is asked for its tightest bend has none left to correct with.
+    // A margin of a tenth: a robot in its tightest bend cannot turn more to correct itself.
     let tightest_m = settings.bend_m.max(1.1 * steering.radius_m());
     let bends = [0.0, 1.0, -1.0, 0.4, -0.4];
     let travel_m = settings.step_m;
@@ -102,30 +102,31 @@ fn moves(steering: &Steering, settings: &HybridSettings) -> Vec<Primitive> {
     moves
 }
 
-struct Node {
+struct LatticeNode {
     pose: Pose,
-    /// Cost of the way here, metres.
+    /// Cost of the path from the start, metres.
     cost_m: f64,
     parent: u32,
     primitive: Primitive,
 }
 
-struct Search<'a> {
-    checker: &'a FootprintChecker,
+struct LatticeSearch<'a> {
+    checker: &'a dyn RobotGeometry,
     settings: &'a HybridSettings,
-    /// Estimated cost of the rest for each cell, metres; infinite where there is no way.
+    /// Estimated cost of the rest for each cell, metres; infinite where there is no path.
     rest_m: &'a [f32],
-    nodes: Vec<Node>,
-    /// The best node of each bin plus one, so that the zeroed pages of an untouched map mean none.
+    nodes: Vec<LatticeNode>,
+    /// The best node of each bin plus one. Zero means none, so that pages of the map that no search touches
+    /// are never written.
     best: Vec<u32>,
     bins: [usize; 2],
     /// Estimated total (bits of a positive float, which sort like it) and node.
     open: BinaryHeap<Reverse<(u64, u32)>>,
 }
 
-impl<'a> Search<'a> {
-    fn new(checker: &'a FootprintChecker, rest_m: &'a [f32], settings: &'a HybridSettings) -> Self {
-        let frame = checker.field().frame();
+impl<'a> LatticeSearch<'a> {
+    fn new(checker: &'a dyn RobotGeometry, rest_m: &'a [f32], settings: &'a HybridSettings) -> Self {
+        let frame = checker.clearance().frame();
         let bins = [frame.width, frame.height]
             .map(|cells| (cells as f64 * frame.resolution_m / settings.bin_m) as usize + 1);
         let best = vec![0; bins[0] * bins[1] * settings.headings];
@@ -133,7 +134,7 @@ impl<'a> Search<'a> {
     }
 
     fn bin(&self, pose: &Pose) -> usize {
-        let frame = self.checker.field().frame();
+        let frame = self.checker.clearance().frame();
         let at = frame.to_grid(pose.position) * (frame.resolution_m / self.settings.bin_m);
         let (col, row) = ((at.x as usize).min(self.bins[0] - 1), (at.y as usize).min(self.bins[1] - 1));
         let headings = self.settings.headings as i64;
@@ -142,7 +143,7 @@ impl<'a> Search<'a> {
     }
 
     fn push(&mut self, pose: Pose, cost_m: f64, (parent, primitive): (u32, Primitive)) {
-        let frame = self.checker.field().frame();
+        let frame = self.checker.clearance().frame();
         let Some(cell) = frame.cell_at(pose.position) else { return };
         let rest_m = f64::from(self.rest_m[frame.index(cell)]);
         let bin = self.bin(&pose);
@@ -150,11 +151,11 @@ impl<'a> Search<'a> {
             0 => true,
             known => cost_m < self.nodes[known as usize - 1].cost_m,
         };
-        // The start may stand too near to a wall for an estimate; nothing else may.
+        // The start may lie too near to a wall for an estimate. No other pose may.
         if !is_better || (rest_m.is_infinite() && parent != NONE) {
             return;
         }
-        self.nodes.push(Node { pose, cost_m, parent, primitive });
+        self.nodes.push(LatticeNode { pose, cost_m, parent, primitive });
         let node = self.nodes.len() as u32;
         self.best[bin] = node;
         self.open.push(Reverse(((cost_m + rest_m).to_bits(), node - 1)));
@@ -171,14 +172,14 @@ impl<'a> Search<'a> {
     }
 
     fn expand(&mut self, node: u32, primitive: Primitive) {
-        let Node { pose, cost_m, .. } = self.nodes[node as usize];
+        let LatticeNode { pose, cost_m, .. } = self.nodes[node as usize];
         let end = primitive.advance(pose, 1.0);
         if !self.checker.is_free(end) || !self.is_free_along(pose, primitive) {
             return;
         }
         let bend = if primitive.turn_rad == 0.0 { 1.0 } else { BEND_PRICE };
         let driven_m = bend * primitive.cost_m();
-        let price = price(self.checker, self.checker.field().sample(end.position), self.settings);
+        let price = price(self.checker, self.checker.clearance().sample(end.position), self.settings);
         self.push(end, cost_m + driven_m * price, (node, primitive));
     }
 
@@ -205,17 +206,18 @@ impl<'a> Search<'a> {
 }
 
 /// What a metre costs where the nearest blocked cell is `clearance_m` away.
-fn price(checker: &FootprintChecker, clearance_m: f64, settings: &HybridSettings) -> f64 {
+fn price(checker: &dyn RobotGeometry, clearance_m: f64, settings: &HybridSettings) -> f64 {
     let room_m = clearance_m - checker.footprint().inscribed_radius_m();
     let lack = (1.0 - room_m / settings.comfort_m).clamp(0.0, 1.0);
     1.0 + settings.clearance_weight * lack * lack
 }
 
-/// For each cell the cost of the cheapest way to `goal` over cells as wide as the robot; `None` if the
-/// goal itself has no room.
-fn cost_to_go_m(checker: &FootprintChecker, goal: Point, settings: &HybridSettings) -> Option<Vec<f32>> {
-    let (field, frame) = (checker.field(), checker.field().frame());
-    // Distances between centres hide up to 1.21 cells; an estimate must not close a way that is open.
+/// For each cell the cost of the cheapest path to `goal` over cells with clearance for the robot's width.
+/// `None` if the goal itself lacks that clearance.
+fn cost_to_go_m(checker: &dyn RobotGeometry, goal: Point, settings: &HybridSettings) -> Option<Vec<f32>> {
+    let (field, frame) = (checker.clearance(), checker.clearance().frame());
+    // Distances between centres are wrong by up to 1.21 cells. The heuristic must not close a passage that is
+    // open.
     let least_m =
         (checker.footprint().inscribed_radius_m() - 1.21 * frame.resolution_m).max(f64::MIN_POSITIVE);
     let mut costs = vec![f32::INFINITY; frame.len()];
@@ -248,7 +250,7 @@ fn length_m(a: Cell, b: Cell, resolution_m: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use sharp_space::{Footprint, OccupancyGrid};
+    use sharp_space::{CollisionChecker, Footprint, FootprintChecker, OccupancyGrid};
 
     use super::*;
 
@@ -272,8 +274,9 @@ mod tests {
     }
 
     fn solve(steering: &Steering, start: Pose, goal: Pose) -> Path {
-        let outcome = hybrid_astar(&Query { start, goal }, &rooms(), steering, &HybridSettings::default());
-        outcome.path().unwrap_or_else(|| panic!("{steering:?} found no way"))
+        let outcome =
+            hybrid_astar(&MotionQuery { start, goal }, &rooms(), steering, &HybridSettings::default());
+        outcome.path().unwrap_or_else(|| panic!("{steering:?} found no path"))
     }
 
     #[test]
@@ -297,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_through_the_middle_of_the_door_is_cheaper() {
+    fn a_path_through_the_middle_of_the_door_is_cheaper() {
         let path = solve(&CAR, Pose::new(1.5, 2.0, 0.0), Pose::new(6.5, 2.0, 0.0));
         let in_door = path.poses().iter().filter(|pose| (pose.position.x - 4.25).abs() < 0.3);
         let off_m = in_door.map(|pose| (pose.position.y - 2.0).abs()).fold(0.0, f64::max);
@@ -305,14 +308,14 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_solved_is_told_apart() {
+    fn failures_are_told_apart() {
         let ask = |start, goal, iterations| {
             let settings = HybridSettings { budget: Budget { iterations }, ..HybridSettings::default() };
-            hybrid_astar(&Query { start, goal }, &rooms(), &CAR, &settings)
+            hybrid_astar(&MotionQuery { start, goal }, &rooms(), &CAR, &settings)
         };
         let (inside, wall) = (Pose::new(1.5, 2.0, 0.0), Pose::new(4.2, 0.8, 0.0));
-        assert_eq!(ask(wall, inside, 10), Outcome::InvalidStart);
-        assert_eq!(ask(inside, wall, 10), Outcome::InvalidGoal);
-        assert_eq!(ask(inside, Pose::new(6.5, 2.0, 0.0), 3), Outcome::Exhausted { iterations: 3 });
+        assert_eq!(ask(wall, inside, 10), PathOutcome::InvalidStart);
+        assert_eq!(ask(inside, wall, 10), PathOutcome::InvalidGoal);
+        assert_eq!(ask(inside, Pose::new(6.5, 2.0, 0.0), 3), PathOutcome::Exhausted { iterations: 3 });
     }
 }

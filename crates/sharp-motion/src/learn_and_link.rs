@@ -1,12 +1,12 @@
 //! Learn and Link (Molina, Kumar and Srivastava, ICRA 2020): the planner behind the paper's guide paths.
 //!
-//! One tree grows from each critical seed, from the start and from the goal. Round-robin, a tree is
-//! extended by one step and every other tree is connected to the new pose. The published planner
-//! keeps undirected edges; a forward-only robot cannot drive them back, so here each pose belongs
-//! to a *group*: reached from the start, leading to the goal, or a patch around some seeds. A link
-//! from the start's group into a patch moves everything that the linked pose leads to; a link into
-//! the goal's group everything that leads to it. The query is solved when the two groups meet.
-//! With the patches gone what remains is RRT-Connect, hence probabilistic completeness.
+//! One tree grows from each critical seed, from the start and from the goal. Round-robin, a tree is extended
+//! by one step and every other tree is connected to the new pose. The published planner keeps undirected
+//! edges; a forward-only robot cannot drive them back, so here each pose belongs to a *group*: reached from
+//! the start, leading to the goal, or a patch around some seeds. A link from the start's group into a patch
+//! moves everything that the linked pose leads to; a link into the goal's group everything that leads to it.
+//! The query is solved when the two groups meet. Without patches the algorithm is RRT-Connect, so it is
+//! probabilistically complete.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -15,44 +15,44 @@ use sharp_space::{CollisionChecker, Pose, Stream};
 
 use crate::maneuver::Maneuver;
 use crate::path::Path;
-use crate::query::{Outcome, Query, RrtSettings};
+use crate::query::{MotionQuery, PathOutcome, RrtSettings};
 use crate::sampler::Sampler;
 use crate::steering::Steering;
-use crate::tree::{Direction, Scene, Step, poses_along};
+use crate::tree::{Direction, Extender, Extension, poses_along};
 
 /// Grows a tree from the start, the goal and each free seed and links them; seeds in collision are skipped.
 ///
 /// Returns the cheapest path in the roadmap that was grown.
 pub fn learn_and_link(
-    query: &Query,
+    query: &MotionQuery,
     seeds: &[Pose],
     checker: &(impl CollisionChecker + ?Sized),
     steering: &Steering,
     sampler: &mut (impl Sampler + ?Sized),
     settings: &RrtSettings,
     rng: &mut Stream,
-) -> Outcome {
+) -> PathOutcome {
     if let Some(outcome) = query.blocked_end(checker) {
         return outcome;
     }
-    let scene = Scene { checker, steering, settings };
+    let extender = Extender { checker, steering, settings };
     let free_seeds = seeds.iter().copied().filter(|&seed| checker.is_free(seed));
     let mut roadmap = Roadmap::new(query, free_seeds);
     let mut turn = START;
     for iteration in 0..settings.budget.iterations {
         let direction = roadmap.growth(turn, iteration);
         let target = if iteration == 0 { query.goal } else { sampler.sample(rng) };
-        if let Some(new) = roadmap.extend(&scene, turn, direction, target) {
-            roadmap.link_all(&scene, new);
+        if let Some(new) = roadmap.extend(&extender, turn, direction, target) {
+            roadmap.link_all(&extender, new);
         }
         if roadmap.solved {
             let edges = roadmap.cheapest();
             let poses = poses_along(query.start, &edges, settings.check_step_m);
-            return Outcome::Solved(Path::new(poses).expect("it holds the start"));
+            return PathOutcome::Solved(Path::new(poses).expect("it holds the start"));
         }
         turn = roadmap.next_group(turn);
     }
-    Outcome::Exhausted { iterations: settings.budget.iterations }
+    PathOutcome::Exhausted { iterations: settings.budget.iterations }
 }
 
 /// The group of poses that the start leads to.
@@ -60,7 +60,7 @@ const START: usize = 0;
 /// The group of poses that lead to the goal.
 const GOAL: usize = 1;
 
-struct Link {
+struct RoadmapLink {
     from: usize,
     to: usize,
     maneuver: Maneuver,
@@ -69,17 +69,17 @@ struct Link {
 struct Roadmap {
     poses: Vec<Pose>,
     group: Vec<usize>,
-    links: Vec<Link>,
+    links: Vec<RoadmapLink>,
     /// Numbers of the links that leave and enter each pose.
     leaving: Vec<Vec<usize>>,
     entering: Vec<Vec<usize>>,
-    /// Poses in each group; a group without any is gone.
+    /// Poses in each group. An empty group no longer exists.
     sizes: Vec<usize>,
     solved: bool,
 }
 
 impl Roadmap {
-    fn new(query: &Query, seeds: impl Iterator<Item = Pose>) -> Self {
+    fn new(query: &MotionQuery, seeds: impl Iterator<Item = Pose>) -> Self {
         let mut roadmap = Self {
             poses: Vec::new(),
             group: Vec::new(),
@@ -120,49 +120,49 @@ impl Roadmap {
         (1..=count).map(|i| (group + i) % count).find(|&g| self.sizes[g] > 0).unwrap_or(START)
     }
 
-    /// One step of `group` towards `target`; the new pose if nothing is in the way.
+    /// One step of `group` towards `target`: the new pose, if no obstacle is in the way.
     fn extend<C: CollisionChecker + ?Sized>(
         &mut self,
-        scene: &Scene<'_, C>,
+        extender: &Extender<'_, C>,
         group: usize,
         direction: Direction,
         target: Pose,
     ) -> Option<usize> {
-        let near = self.nearest_per_group(scene, target, |_| direction)[group]?.node;
-        let step = scene.step(direction, self.poses[near], target)?;
+        let near = self.nearest_per_group(extender, target, |_| direction)[group]?.node;
+        let step = extender.step(direction, self.poses[near], target)?;
         Some(self.grow(near, direction, &step))
     }
 
     /// Connects every other group to `new`, as far as each gets.
-    fn link_all<C: CollisionChecker + ?Sized>(&mut self, scene: &Scene<'_, C>, new: usize) {
+    fn link_all<C: CollisionChecker + ?Sized>(&mut self, extender: &Extender<'_, C>, new: usize) {
         let home = self.group[new];
         let direction = |group| match (home, group) {
             (START, _) | (_, GOAL) => Direction::Backward,
             (GOAL, _) | (_, START) => Direction::Forward,
-            // Between patches either way will do; the new pose's number makes the choice even.
+            // Between patches either direction is allowed. The parity of the new pose's number picks one.
             _ if new.is_multiple_of(2) => Direction::Forward,
             _ => Direction::Backward,
         };
-        let nearest = self.nearest_per_group(scene, self.poses[new], direction);
+        let nearest = self.nearest_per_group(extender, self.poses[new], direction);
         for (group, near) in nearest.into_iter().enumerate() {
             // An earlier link may have merged this group with the new pose's.
             let Some(near) = near.filter(|near| self.group[near.node] != self.group[new]) else { continue };
-            self.connect(scene, near.node, direction(group), new);
+            self.connect(extender, near.node, direction(group), new);
             if self.solved {
                 return;
             }
         }
     }
 
-    /// Steps from `node` towards the pose `goal` until it is linked or something is in the way.
+    /// Steps from `node` towards the pose `goal` until it is linked or an obstacle is in the way.
     fn connect<C: CollisionChecker + ?Sized>(
         &mut self,
-        scene: &Scene<'_, C>,
+        extender: &Extender<'_, C>,
         mut node: usize,
         direction: Direction,
         goal: usize,
     ) {
-        while let Some(step) = scene.step(direction, self.poses[node], self.poses[goal]) {
+        while let Some(step) = extender.step(direction, self.poses[node], self.poses[goal]) {
             if step.reached {
                 self.link(node, goal, direction, step.edge);
                 return;
@@ -171,7 +171,7 @@ impl Roadmap {
         }
     }
 
-    fn grow(&mut self, node: usize, direction: Direction, step: &Step) -> usize {
+    fn grow(&mut self, node: usize, direction: Direction, step: &Extension) -> usize {
         let new = self.push(step.pose, self.group[node]);
         self.link(node, new, direction, step.edge);
         new
@@ -181,13 +181,13 @@ impl Roadmap {
         let (from, to) = if direction == Direction::Forward { (node, other) } else { (other, node) };
         self.leaving[from].push(self.links.len());
         self.entering[to].push(self.links.len());
-        self.links.push(Link { from, to, maneuver });
+        self.links.push(RoadmapLink { from, to, maneuver });
         match (self.group[from], self.group[to]) {
             (a, b) if a == b => {}
             (START, GOAL) => self.solved = true,
             (START, _) => self.flood(to, START),
             (_, GOAL) => self.flood(from, GOAL),
-            // Into the start's or out of the goal's group nothing is gained.
+            // A link into the start's group or out of the goal's group brings nothing.
             (_, START) | (GOAL, _) => {}
             (a, b) => self.merge(a.max(b), a.min(b)),
         }
@@ -229,26 +229,26 @@ impl Roadmap {
     /// For each group the pose that is cheapest to connect with `target`.
     fn nearest_per_group<C: CollisionChecker + ?Sized>(
         &self,
-        scene: &Scene<'_, C>,
+        extender: &Extender<'_, C>,
         target: Pose,
         direction: impl Fn(usize) -> Direction,
-    ) -> Vec<Option<Near>> {
-        let mut nearest: Vec<Option<Near>> = vec![None; self.sizes.len()];
+    ) -> Vec<Option<NearestPose>> {
+        let mut nearest: Vec<Option<NearestPose>> = vec![None; self.sizes.len()];
         for (node, (&pose, &group)) in self.poses.iter().zip(&self.group).enumerate() {
             // Driving is never shorter than the straight, so most poses need no maneuver.
             let best_m = nearest[group].map_or(f64::INFINITY, |near| near.cost_m);
             if pose.distance_m(&target) >= best_m {
                 continue;
             }
-            let cost_m = scene.maneuver(direction(group), pose, target).cost_m();
+            let cost_m = extender.maneuver(direction(group), pose, target).cost_m();
             if cost_m < best_m {
-                nearest[group] = Some(Near { node, cost_m });
+                nearest[group] = Some(NearestPose { node, cost_m });
             }
         }
         nearest
     }
 
-    /// The edges of the cheapest way from the start to the goal, by Dijkstra's algorithm.
+    /// The edges of the cheapest path from the start to the goal, by Dijkstra's algorithm.
     fn cheapest(&self) -> Vec<Maneuver> {
         let mut cost = vec![f64::INFINITY; self.poses.len()];
         let mut via = vec![usize::MAX; self.poses.len()];
@@ -281,7 +281,7 @@ impl Roadmap {
 }
 
 #[derive(Clone, Copy)]
-struct Near {
+struct NearestPose {
     node: usize,
     cost_m: f64,
 }

@@ -9,7 +9,7 @@ use sharp_space::Point;
 const BUCKETS: usize = 1024;
 /// Marks the end of a chain.
 const NONE: u32 = u32::MAX;
-/// Below this size comparing all is faster than walking rings.
+/// Below this size it is faster to compare all points than to walk rings.
 const LINEAR_MAX: usize = 24;
 
 /// An index of positions, numbered in the order of insertion.
@@ -21,7 +21,7 @@ pub struct Nearest {
     heads: Vec<u32>,
     /// The position inserted before into the same bucket, or [`NONE`].
     next: Vec<u32>,
-    /// The rectangle of bucket coordinates in use: no ring reaches further.
+    /// The rectangle of bucket coordinates in use: no ring needs to reach further.
     low: [i32; 2],
     high: [i32; 2],
 }
@@ -55,7 +55,7 @@ impl Nearest {
     ///
     /// `None` if the index is empty or every cost is infinite.
     pub fn nearest(&self, point: Point, mut cost: impl FnMut(usize) -> f64) -> Option<usize> {
-        let mut best = Best { cost: f64::INFINITY, index: usize::MAX };
+        let mut best = NearestSoFar { cost: f64::INFINITY, index: usize::MAX };
         if self.points.len() <= LINEAR_MAX {
             for index in 0..self.points.len() {
                 self.offer(&mut best, point, index, &mut cost);
@@ -75,13 +75,19 @@ impl Nearest {
         best.found()
     }
 
-    fn offer(&self, best: &mut Best, point: Point, index: usize, cost: &mut impl FnMut(usize) -> f64) {
+    fn offer(
+        &self,
+        best: &mut NearestSoFar,
+        point: Point,
+        index: usize,
+        cost: &mut impl FnMut(usize) -> f64,
+    ) {
         if (self.points[index] - point).norm_squared() > best.cost * best.cost {
             return;
         }
         let cost = cost(index);
         if cost < best.cost || (cost <= best.cost && index < best.index) {
-            *best = Best { cost, index };
+            *best = NearestSoFar { cost, index };
         }
     }
 
@@ -113,18 +119,18 @@ impl Nearest {
     }
 }
 
-struct Best {
+struct NearestSoFar {
     cost: f64,
     index: usize,
 }
 
-impl Best {
+impl NearestSoFar {
     fn found(self) -> Option<usize> {
         (self.index != usize::MAX).then_some(self.index)
     }
 }
 
-/// Neighbouring buckets get neighbouring slots; a 32 by 32 block has no clash.
+/// Neighbouring buckets get neighbouring slots. Within a block of 32 by 32 buckets no two share a slot.
 fn slot(bucket: [i32; 2]) -> usize {
     (bucket[0].rem_euclid(32) + 32 * bucket[1].rem_euclid(32)) as usize
 }

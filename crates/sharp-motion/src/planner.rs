@@ -1,9 +1,9 @@
-//! The planners behind one trait, for callers that choose one at run time.
+//! The trait of motion planners, and ours behind it for callers that choose one at run time.
 
 use sharp_space::{Bounds, CollisionChecker, Pose, Stream};
 
 use crate::learn_and_link::learn_and_link;
-use crate::query::{Outcome, Query, RrtSettings};
+use crate::query::{MotionQuery, PathOutcome, RrtSettings};
 use crate::rrt::rrt;
 use crate::rrt_connect::rrt_connect;
 use crate::sampler::Uniform;
@@ -12,7 +12,7 @@ use crate::steering::Steering;
 /// Answers motion planning queries.
 pub trait MotionPlanner {
     /// A free path from the query's start to its goal, or why there is none.
-    fn plan(&self, query: &Query, checker: &dyn CollisionChecker, rng: &mut Stream) -> Outcome;
+    fn plan(&self, query: &MotionQuery, checker: &dyn CollisionChecker, rng: &mut Stream) -> PathOutcome;
 }
 
 /// Which algorithm answers.
@@ -20,9 +20,9 @@ pub trait MotionPlanner {
 pub enum Algorithm {
     /// One tree from the start: [`rrt`].
     Rrt,
-    /// A tree from either end: [`rrt_connect`].
+    /// One tree from each end: [`rrt_connect`].
     RrtConnect,
-    /// A tree from either end and from each seed: [`learn_and_link`].
+    /// One tree from each end and from each seed: [`learn_and_link`].
     LearnAndLink {
         /// Poses in critical regions.
         seeds: Vec<Pose>,
@@ -31,7 +31,7 @@ pub enum Algorithm {
 
 /// An algorithm for one robot that samples uniformly over one map.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Planner {
+pub struct SamplingPlanner {
     /// Which algorithm.
     pub algorithm: Algorithm,
     /// What the robot can drive.
@@ -42,8 +42,8 @@ pub struct Planner {
     pub settings: RrtSettings,
 }
 
-impl MotionPlanner for Planner {
-    fn plan(&self, query: &Query, checker: &dyn CollisionChecker, rng: &mut Stream) -> Outcome {
+impl MotionPlanner for SamplingPlanner {
+    fn plan(&self, query: &MotionQuery, checker: &dyn CollisionChecker, rng: &mut Stream) -> PathOutcome {
         let Self { algorithm, steering, bounds, settings } = self;
         let mut sampler = Uniform { bounds: *bounds };
         match algorithm {

@@ -4,26 +4,26 @@ use sharp_space::{CollisionChecker, Pose};
 
 use crate::path::Path;
 
-/// Asks for a way from one pose to another.
+/// Asks for a path from one pose to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Query {
+pub struct MotionQuery {
     /// Where the robot stands.
     pub start: Pose,
-    /// Where it shall stand.
+    /// Where it must arrive.
     pub goal: Pose,
 }
 
-impl Query {
+impl MotionQuery {
     /// The outcome that is known before any search: a blocked end.
-    pub(crate) fn blocked_end(&self, checker: &(impl CollisionChecker + ?Sized)) -> Option<Outcome> {
+    pub(crate) fn blocked_end(&self, checker: &(impl CollisionChecker + ?Sized)) -> Option<PathOutcome> {
         if !checker.is_free(self.start) {
-            return Some(Outcome::InvalidStart);
+            return Some(PathOutcome::InvalidStart);
         }
-        (!checker.is_free(self.goal)).then_some(Outcome::InvalidGoal)
+        (!checker.is_free(self.goal)).then_some(PathOutcome::InvalidGoal)
     }
 }
 
-/// How long a planner may try. Counted, not timed, so that a run can be repeated.
+/// How long a planner may try. The limit is a count, not a time, so that a run can be repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     /// Samples drawn.
@@ -55,9 +55,9 @@ impl Default for RrtSettings {
     }
 }
 
-/// What a planner found. Not finding a path is an answer, not an error.
+/// What a planner found. To find no path is an outcome, not an error.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
+pub enum PathOutcome {
     /// A collision-free path from the start to the goal.
     Solved(Path),
     /// The start is in collision or outside the map.
@@ -71,7 +71,7 @@ pub enum Outcome {
     },
 }
 
-impl Outcome {
+impl PathOutcome {
     /// The path, if there is one.
     #[must_use]
     pub fn path(self) -> Option<Path> {

@@ -1,4 +1,4 @@
-//! Where planners look: distributions over poses.
+//! Distributions over poses that planners draw from.
 
 use std::f64::consts::PI;
 
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn samples_stay_where_they_belong() {
+    fn samples_lie_in_their_areas() {
         let frame = GridFrame { origin: Pose::new(-1.0, 2.0, 0.4), resolution_m: 0.5, width: 9, height: 7 };
         let cells = [Cell::new(2, 3), Cell::new(8, 6)];
         let bounds = Bounds { min: Point::new(50.0, 50.0), max: Point::new(51.0, 52.0) };

@@ -40,7 +40,7 @@ pub fn shortcut(
         let direct = steering.maneuver(poses[first], poses[last]);
         let along: f64 =
             poses[first..=last].windows(2).map(|pair| steering.distance_m(pair[0], pair[1])).sum();
-        // A millimetre of gain is noise and would be chased for ever.
+        // A gain below a millimetre is noise, and accepting it would waste the remaining iterations.
         let gains = direct.cost_m() < along - 1e-3;
         if gains && direct.all(settings.check_step_m, |pose| checker.is_free(pose)) {
             poses.splice(first..=last, direct.poses(settings.check_step_m));

@@ -5,7 +5,8 @@ use sharp_space::{Heading, Pose};
 use crate::dubins;
 use crate::maneuver::{Maneuver, Primitive};
 
-/// How a robot gets from one pose to another where nothing is in the way. Forward only, hence directed.
+/// How a robot gets from one pose to another where no obstacle is in the way. It drives forward only, so
+/// connections are directed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steering {
     /// Turn in place, drive straight, turn in place: a differential drive.

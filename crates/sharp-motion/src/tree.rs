@@ -7,14 +7,14 @@ use crate::nearest::Nearest;
 use crate::query::RrtSettings;
 use crate::steering::Steering;
 
-/// What every extension needs to know.
-pub(crate) struct Scene<'a, C: ?Sized> {
+/// Extends trees: what every extension needs, and the steps themselves.
+pub(crate) struct Extender<'a, C: ?Sized> {
     pub(crate) checker: &'a C,
     pub(crate) steering: &'a Steering,
     pub(crate) settings: &'a RrtSettings,
 }
 
-/// The way a tree's edges are driven.
+/// The direction in which a tree's edges are driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Direction {
     /// From the root outwards.
@@ -24,7 +24,7 @@ pub(crate) enum Direction {
 }
 
 /// One step from a node towards a pose.
-pub(crate) struct Step {
+pub(crate) struct Extension {
     /// Driven away from the node, or towards it in a backward tree.
     pub(crate) edge: Maneuver,
     /// The far end.
@@ -33,7 +33,7 @@ pub(crate) struct Step {
     pub(crate) reached: bool,
 }
 
-impl<C: CollisionChecker + ?Sized> Scene<'_, C> {
+impl<C: CollisionChecker + ?Sized> Extender<'_, C> {
     /// The connection between `node` and `target`, driven in `direction` as seen from the node.
     pub(crate) fn maneuver(&self, direction: Direction, node: Pose, target: Pose) -> Maneuver {
         match direction {
@@ -42,8 +42,8 @@ impl<C: CollisionChecker + ?Sized> Scene<'_, C> {
         }
     }
 
-    /// Goes from `node` towards `target` by at most the range; `None` if something is in the way.
-    pub(crate) fn step(&self, direction: Direction, node: Pose, target: Pose) -> Option<Step> {
+    /// Goes from `node` towards `target` by at most the range. `None` if an obstacle is in the way.
+    pub(crate) fn step(&self, direction: Direction, node: Pose, target: Pose) -> Option<Extension> {
         let whole = self.maneuver(direction, node, target);
         let range_m = self.settings.range_m;
         let reached = whole.travel_m() <= range_m;
@@ -58,7 +58,7 @@ impl<C: CollisionChecker + ?Sized> Scene<'_, C> {
             }
         };
         let is_free = |pose| self.checker.is_free(pose);
-        (is_free(pose) && edge.all(self.settings.check_step_m, is_free)).then_some(Step {
+        (is_free(pose) && edge.all(self.settings.check_step_m, is_free)).then_some(Extension {
             edge,
             pose,
             reached,
@@ -66,32 +66,32 @@ impl<C: CollisionChecker + ?Sized> Scene<'_, C> {
     }
 }
 
-struct Node {
+struct TreeNode {
     pose: Pose,
     parent: usize,
     /// Connects parent and node; at the root, a stay.
     edge: Maneuver,
 }
 
-/// A tree of poses. Node 0 is the root.
-pub(crate) struct Tree {
-    nodes: Vec<Node>,
+/// A tree of poses. TreeNode 0 is the root.
+pub(crate) struct PoseTree {
+    nodes: Vec<TreeNode>,
     index: Nearest,
     direction: Direction,
 }
 
-/// Where an extension led.
-pub(crate) enum Reach {
+/// How an extension ended.
+pub(crate) enum ExtensionEnd {
     Trapped,
     Advanced(usize),
     Reached(usize),
 }
 
-impl Tree {
+impl PoseTree {
     pub(crate) fn new(root: Pose, direction: Direction, settings: &RrtSettings) -> Self {
         let mut tree = Self { nodes: Vec::new(), index: Nearest::new(settings.range_m), direction };
         let stay = Maneuver::new(root, root, [crate::Primitive::default(); 3]);
-        tree.push(Node { pose: root, parent: 0, edge: stay });
+        tree.push(TreeNode { pose: root, parent: 0, edge: stay });
         tree
     }
 
@@ -100,39 +100,44 @@ impl Tree {
     }
 
     /// The node from which `target` is cheapest to connect.
-    pub(crate) fn nearest<C: CollisionChecker + ?Sized>(&self, scene: &Scene<'_, C>, target: Pose) -> usize {
-        let cost = |i: usize| scene.maneuver(self.direction, self.nodes[i].pose, target).cost_m();
+    pub(crate) fn nearest<C: CollisionChecker + ?Sized>(
+        &self,
+        extender: &Extender<'_, C>,
+        target: Pose,
+    ) -> usize {
+        let cost = |i: usize| extender.maneuver(self.direction, self.nodes[i].pose, target).cost_m();
         self.index.nearest(target.position, cost).expect("a tree has a root")
     }
 
     /// One step from `node` towards `target`.
     pub(crate) fn extend<C: CollisionChecker + ?Sized>(
         &mut self,
-        scene: &Scene<'_, C>,
+        extender: &Extender<'_, C>,
         node: usize,
         target: Pose,
-    ) -> Reach {
-        let Some(Step { edge, pose, reached }) = scene.step(self.direction, self.nodes[node].pose, target)
+    ) -> ExtensionEnd {
+        let Some(Extension { edge, pose, reached }) =
+            extender.step(self.direction, self.nodes[node].pose, target)
         else {
-            return Reach::Trapped;
+            return ExtensionEnd::Trapped;
         };
-        self.push(Node { pose, parent: node, edge });
+        self.push(TreeNode { pose, parent: node, edge });
         let new = self.nodes.len() - 1;
-        if reached { Reach::Reached(new) } else { Reach::Advanced(new) }
+        if reached { ExtensionEnd::Reached(new) } else { ExtensionEnd::Advanced(new) }
     }
 
-    /// Steps from the nearest node towards `target` until it is reached or something is in the way.
+    /// Steps from the nearest node towards `target` until it is reached or an obstacle is in the way.
     pub(crate) fn connect<C: CollisionChecker + ?Sized>(
         &mut self,
-        scene: &Scene<'_, C>,
+        extender: &Extender<'_, C>,
         target: Pose,
     ) -> Option<usize> {
-        let mut node = self.nearest(scene, target);
+        let mut node = self.nearest(extender, target);
         loop {
-            match self.extend(scene, node, target) {
-                Reach::Trapped => return None,
-                Reach::Advanced(new) => node = new,
-                Reach::Reached(new) => return Some(new),
+            match self.extend(extender, node, target) {
+                ExtensionEnd::Trapped => return None,
+                ExtensionEnd::Advanced(new) => node = new,
+                ExtensionEnd::Reached(new) => return Some(new),
             }
         }
     }
@@ -150,7 +155,7 @@ impl Tree {
         edges
     }
 
-    fn push(&mut self, node: Node) {
+    fn push(&mut self, node: TreeNode) {
         self.index.insert(node.pose.position);
         self.nodes.push(node);
     }

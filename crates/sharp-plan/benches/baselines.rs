@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand::RngExt;
+use sharp_maps::{FloorplanKind, generate};
 use sharp_plan::{Query, RoutePlanner, Workspace};
 use sharp_sim::RobotModel;
-use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{Point, Pose, Seed, Stream};
 
 /// Problems of each map.

@@ -126,7 +126,7 @@ impl Trial<'_> {
     }
 
     /// Results come in the order of the episodes, whatever thread ran them.
-    fn run<S: Simulator + Sync, T: Send>(
+    fn run<S: Simulator + Clone, T: Send>(
         &self,
         vehicle: &Vehicle<S>,
         episodes: Range<u32>,

@@ -4,7 +4,7 @@
 //! hand in place of noise.
 
 use sharp_sim::{
-    ActionSettings, Command, Drive, RobotModel, RobotState, STEER_PER_DRIFT_S, WaypointController,
+    ActionSettings, Drive, RobotModel, RobotState, STEER_PER_DRIFT_S, WaypointController, WheelCommand,
 };
 use sharp_space::{Heading, Pose, Vector, trig};
 
@@ -67,8 +67,8 @@ impl Model {
         for _ in 0..steps() {
             let (command, slope) = self.controller.command_and_slope(state, &aim);
             let response = self.follow(state, command, traits);
-            let (Command::Twist { yaw_rate_radps: asked, .. } | Command::Steer { steer_rad: asked, .. }) =
-                command;
+            let (WheelCommand::Twist { yaw_rate_radps: asked, .. }
+            | WheelCommand::Steer { steer_rad: asked, .. }) = command;
             if !response.is_limited {
                 let by_turn = slope * traits.yaw_share * response.unit;
                 rate = Slopes {
@@ -85,17 +85,17 @@ impl Model {
     }
 
     /// One time step; what it answers is the derivative of the motion.
-    fn follow(&self, state: &mut RobotState, command: Command, traits: &Traits) -> Response {
+    fn follow(&self, state: &mut RobotState, command: WheelCommand, traits: &Traits) -> Response {
         let robot = &self.robot;
         let Traits { speed_share, yaw_share, drift_radps } = *traits;
-        let (Command::Twist { speed_mps, .. } | Command::Steer { speed_mps, .. }) = command;
+        let (WheelCommand::Twist { speed_mps, .. } | WheelCommand::Steer { speed_mps, .. }) = command;
         let wanted_mps = speed_mps * speed_share;
         state.wheel_speed_mps =
             approach(state.wheel_speed_mps, wanted_mps, robot.max_accel_mps2 * MODEL_DT_S);
         let (turn_rad, slip_rad, response) = match (robot.drive, command) {
             (
                 Drive::Ackermann { steer_rate_radps, wheelbase_m, max_steer_rad, .. },
-                Command::Steer { steer_rad, .. },
+                WheelCommand::Steer { steer_rad, .. },
             ) => {
                 let wanted_rad = steer_rad * yaw_share + drift_radps * STEER_PER_DRIFT_S;
                 let within_rad = wanted_rad.clamp(-max_steer_rad, max_steer_rad);
@@ -107,7 +107,7 @@ impl Model {
                 let turn = way * (1.0 + tan * tan);
                 (way * tan, 0.5 * tan, Response { unit: 1.0, pull: STEER_PER_DRIFT_S, is_limited, turn })
             }
-            (_, Command::Twist { yaw_rate_radps, .. }) => {
+            (_, WheelCommand::Twist { yaw_rate_radps, .. }) => {
                 let step = robot.max_yaw_accel_radps2 * MODEL_DT_S;
                 let unit = robot.yaw_gain();
                 let wanted_radps = yaw_rate_radps * yaw_share * unit + drift_radps * wanted_mps;
@@ -116,7 +116,7 @@ impl Model {
                 let response = Response { unit, pull: wanted_mps, is_limited, turn: MODEL_DT_S };
                 (state.yaw_rate_radps * MODEL_DT_S, 0.0, response)
             }
-            (Drive::Differential { .. }, Command::Steer { .. }) => (0.0, 0.0, Response::default()),
+            (Drive::Differential { .. }, WheelCommand::Steer { .. }) => (0.0, 0.0, Response::default()),
         };
         let heading = state.pose.heading.radians();
         let way =

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sharp_guide::GuidePath;
-use sharp_sim::{ActionSettings, Drive, NoiseModel, RobotModel, RobotState, World};
+use sharp_sim::{ActionSettings, Drive, NoiseModel, ObstacleMap, RobotModel, RobotState};
 use sharp_space::{CollisionChecker, FootprintChecker, Heading, OccupancyGrid, Pose, Vector, trig};
 
 use crate::belief::Belief;
@@ -41,7 +41,7 @@ pub struct Workspace {
     /// The collision function for the robot in the map.
     pub checker: Arc<FootprintChecker>,
     /// The map as the simulators see it.
-    pub world: Arc<World>,
+    pub world: Arc<ObstacleMap>,
     /// Larger and clumsier robots, for whom paths are drawn first.
     pub(crate) spares: Arc<[Spare]>,
     /// What its actions do, as policies imagine it.
@@ -53,7 +53,7 @@ impl Workspace {
     #[must_use]
     pub fn new(grid: OccupancyGrid, robot: RobotModel) -> Self {
         let checker = Arc::new(FootprintChecker::new(&grid, robot.footprint));
-        let world = Arc::new(World::new(&grid, robot.footprint));
+        let world = Arc::new(ObstacleMap::new(&grid, robot.footprint));
         let model = Arc::new(Model::new(&robot));
         let spares = Spare::all(&robot, &checker).into();
         Self { grid: Arc::new(grid), robot: Arc::new(robot), checker, world, spares, model }

@@ -4,8 +4,8 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use sharp_maps::{FloorplanKind, generate};
 use sharp_regions::{GeometricSettings, RegionPredictor, RegionSettings, detect_geometric, predict_regions};
-use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{DistanceField, Footprint, GridFrame, OccupancyGrid, Pose, Seed};
 
 fn husky() -> Footprint {

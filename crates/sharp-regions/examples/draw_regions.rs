@@ -6,11 +6,11 @@
 #![allow(clippy::disallowed_methods, reason = "an example is a command: it reads its arguments")]
 
 use image::{Rgb, RgbImage};
+use sharp_maps::{FloorplanKind, generate};
 use sharp_regions::{
     ComputeDevice, HELD_OUT_KINDS, Prediction, RegionPredictor, RegionSettings, geometric_regions,
     predict_regions,
 };
-use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{Cell, Footprint, OccupancyGrid, Seed};
 
 const SIDE: u32 = 230;

@@ -10,12 +10,12 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use sharp_maps::{FloorplanKind, generate};
 use sharp_motion::Steering;
 use sharp_regions::{
     Activation, ComputeDevice, LabelRobot, RegionPredictor, RegionTrainSettings, TrainProgress, UNetConfig,
     train_regions,
 };
-use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{DistanceField, Footprint, OccupancyGrid, Seed};
 
 /// The shipped network, and one of the plain kind that reads single pixels.

@@ -9,7 +9,9 @@
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sharp_motion::{Budget, FromCells, Outcome, Path, Query, RrtSettings, Sampler, Steering, rrt_connect};
+use sharp_motion::{
+    Budget, FromCells, MotionQuery, Path, PathOutcome, RrtSettings, Sampler, Steering, rrt_connect,
+};
 use sharp_space::{
     Cell, CollisionChecker, DistanceField, Footprint, FootprintChecker, GridFrame, OccupancyGrid, Pose, Seed,
     Stream,
@@ -126,19 +128,19 @@ impl Problems<'_> {
             let mut rng = seed.stream("start", start);
             let far = |pose: &Pose| pose.distance_m(&goal) >= self.settings.distance_min_m;
             let Some(start) = self.free_pose(&mut rng, far) else { continue };
-            if let Some(path) = self.solve(Query { start, goal }, &mut rng) {
+            if let Some(path) = self.solve(MotionQuery { start, goal }, &mut rng) {
                 counts.count(frame, &path, self.settings.endpoint_radius_m);
             }
         }
         counts
     }
 
-    fn solve(&self, query: Query, rng: &mut Stream) -> Option<Path> {
+    fn solve(&self, query: MotionQuery, rng: &mut Stream) -> Option<Path> {
         let settings =
             RrtSettings { budget: Budget { iterations: self.settings.iterations }, ..RrtSettings::default() };
         let mut sampler = self.everywhere;
         match rrt_connect(&query, self.checker, &self.robot.steering, &mut sampler, &settings, rng) {
-            Outcome::Solved(path) => Some(path),
+            PathOutcome::Solved(path) => Some(path),
             _ => None,
         }
     }

@@ -1,7 +1,7 @@
 //! Recipes: a generated map and its labels, from a kind of floor plan, a robot and a seed.
 
 use serde::{Deserialize, Serialize};
-use sharp_space::floorplan::{FloorplanKind, generate};
+use sharp_maps::{FloorplanKind, generate};
 use sharp_space::{OccupancyGrid, Seed};
 
 use crate::labels::{LabelRobot, LabelSettings, Labels, label_map};

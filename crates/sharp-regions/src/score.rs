@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 use serde::Serialize;
-use sharp_space::floorplan::FloorplanKind;
+use sharp_maps::FloorplanKind;
 use sharp_space::{Cell, DistanceField, GridFrame, OccupancyGrid, Region, RegionId, Seed, Stream};
 
 use crate::geometric::disc_around;

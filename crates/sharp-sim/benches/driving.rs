@@ -9,8 +9,8 @@ use std::sync::Arc;
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand::RngExt;
 use sharp_sim::{
-    ActionSettings, AnySim, Command, NoiseModel, RobotModel, RobotState, Simulator, SimulatorKind, Vehicle,
-    World,
+    ActionSettings, AnySim, NoiseModel, ObstacleMap, RobotModel, RobotState, Simulator, SimulatorKind,
+    Vehicle, WheelCommand,
 };
 use sharp_space::{CollisionChecker, OccupancyGrid, Point, Pose, Seed, Stream};
 
@@ -30,7 +30,7 @@ fn grid(map: &str) -> OccupancyGrid {
 }
 
 fn simulator(kind: SimulatorKind, grid: &OccupancyGrid, robot: &RobotModel) -> AnySim {
-    let mut sim = AnySim::new(kind, Arc::new(World::new(grid, robot.footprint)), robot);
+    let mut sim = AnySim::new(kind, Arc::new(ObstacleMap::new(grid, robot.footprint)), robot);
     sim.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)));
     sim
 }
@@ -53,7 +53,7 @@ fn steps_of_robots(c: &mut Criterion) {
         let limo = RobotModel::limo();
         circle(c, &format!("step/{kind}/limo/grid_15"), &mut simulator(kind, &grid, &limo));
         let mut sim = simulator(kind, &grid, &RobotModel::husky());
-        let stop = Command::Twist { speed_mps: 0.0, yaw_rate_radps: 0.0 };
+        let stop = WheelCommand::Twist { speed_mps: 0.0, yaw_rate_radps: 0.0 };
         c.bench_function(&format!("step/{kind}/husky/idle"), |b| b.iter(|| black_box(sim.step(stop, DT_S))));
     }
 }
@@ -64,7 +64,7 @@ fn pushes(c: &mut Criterion) {
         let grid = grid(map);
         for kind in KINDS {
             let mut sim = simulator(kind, &grid, &RobotModel::husky());
-            let command = Command::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
+            let command = WheelCommand::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
             // The slab is 3.3 m ahead.
             let contacts = (0..300).filter(|_| sim.step(command, DT_S).in_contact).count();
             assert!(contacts > 50, "{kind} on {map} touches in {contacts} steps: {:?}", sim.state());
@@ -76,7 +76,7 @@ fn pushes(c: &mut Criterion) {
 
 /// Times steps on a circle of a metre, checked once to be clear.
 fn circle(c: &mut Criterion, name: &str, sim: &mut AnySim) {
-    let command = Command::Twist { speed_mps: 0.8, yaw_rate_radps: 1.0 };
+    let command = WheelCommand::Twist { speed_mps: 0.8, yaw_rate_radps: 1.0 };
     for _ in 0..1200 {
         assert!(!sim.step(command, DT_S).in_contact, "{name}: {:?}", sim.state());
     }
@@ -117,10 +117,12 @@ fn forks(c: &mut Criterion) {
     for map in ["grid_15", "grid_75", "boxes_10000"] {
         let grid = grid(map);
         let footprint = RobotModel::husky().footprint;
-        c.bench_function(&format!("world/{map}"), |b| b.iter(|| black_box(World::new(&grid, footprint))));
+        c.bench_function(&format!("obstacles/{map}"), |b| {
+            b.iter(|| black_box(ObstacleMap::new(&grid, footprint)))
+        });
         for kind in KINDS {
             let mut sim = simulator(kind, &grid, &RobotModel::husky());
-            sim.step(Command::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 }, DT_S);
+            sim.step(WheelCommand::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 }, DT_S);
             c.bench_function(&format!("fork/{kind}/{map}"), |b| b.iter(|| black_box(sim.clone())));
             let state = *sim.state();
             c.bench_function(&format!("reset/{kind}/{map}"), |b| b.iter(|| sim.reset(state)));
@@ -133,22 +135,22 @@ fn collision_checks(c: &mut Criterion) {
     for map in ["grid_15", "grid_75"] {
         let grid = grid(map);
         for robot in [RobotModel::husky(), RobotModel::limo()] {
-            let world = World::new(&grid, robot.footprint);
+            let obstacles = ObstacleMap::new(&grid, robot.footprint);
             let half_m = grid.frame().width_m() / 2.0;
             let anywhere = random_poses(half_m, &mut Seed(2).stream("poses", 0));
             let walk = walk(half_m, &mut Seed(2).stream("walk", 0));
             for (what, poses) in [("random", &anywhere), ("walk", &walk)] {
-                let free = poses.iter().filter(|pose| world.checker().is_free(**pose)).count();
+                let free = poses.iter().filter(|pose| obstacles.checker().is_free(**pose)).count();
                 assert!((POSES / 10..POSES).contains(&free), "{map} {what}: {free} of {POSES} are free");
                 let mut next = poses.iter().cycle();
                 c.bench_function(&format!("footprint/{}/{map}/{what}", robot.name), |b| {
-                    b.iter(|| next.next().map(|pose| world.checker().is_free(*pose)));
+                    b.iter(|| next.next().map(|pose| obstacles.checker().is_free(*pose)));
                 });
             }
             let mut ways = anywhere.iter().map(|from| (*from, two_metres_ahead(from))).cycle();
             c.bench_function(&format!("sweep/{}/{map}", robot.name), |b| {
                 // Half a cell at a time.
-                b.iter(|| ways.next().map(|(from, to)| world.checker().is_segment_free(from, to, 0.05)));
+                b.iter(|| ways.next().map(|(from, to)| obstacles.checker().is_segment_free(from, to, 0.05)));
             });
         }
     }

@@ -11,8 +11,8 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sharp_sim::{AnySim, Command, RobotModel, RobotState, Simulator, SimulatorKind, World};
-use sharp_space::{OccupancyGrid, Point, Pose};
+use sharp_sim::{AnySim, ObstacleMap, RobotModel, RobotState, Simulator, SimulatorKind, WheelCommand};
+use sharp_space::{OccupancyGrid, Point, Pose, trig};
 
 #[path = "../benches/support/maps.rs"]
 mod maps;
@@ -52,8 +52,8 @@ fn grid(map: &str) -> Result<OccupancyGrid, String> {
 /// A list of (centre x, centre y, half length, half width) in the world's frame, metres.
 fn walls(grid: &OccupancyGrid) -> String {
     let corner = grid.frame().origin;
-    let world = World::new(grid, RobotModel::husky().footprint);
-    let boxes = world.walls().map(|wall| {
+    let obstacles = ObstacleMap::new(grid, RobotModel::husky().footprint);
+    let boxes = obstacles.walls().map(|wall| {
         let center = corner.to_world(wall.center);
         format!("[{},{},{},{}]", center.x, center.y, wall.half_extents.x, wall.half_extents.y)
     });
@@ -63,12 +63,12 @@ fn walls(grid: &OccupancyGrid) -> String {
 fn measure(grid: &OccupancyGrid, kind: SimulatorKind, time: Duration) -> String {
     let robot = RobotModel::husky();
     let mut circuit = Circuit {
-        sim: AnySim::new(kind, Arc::new(World::new(grid, robot.footprint)), &robot),
+        sim: AnySim::new(kind, Arc::new(ObstacleMap::new(grid, robot.footprint)), &robot),
         hops: 0,
         left_m: HOP_M,
     };
     circuit.sim.reset(RobotState::at_rest(Pose::new(-2.0, -2.0, 0.0)));
-    let stop = Command::Twist { speed_mps: 0.0, yaw_rate_radps: 0.0 };
+    let stop = WheelCommand::Twist { speed_mps: 0.0, yaw_rate_radps: 0.0 };
     let (idle_steps, idle_s) = repeat(time / 4, || {
         circuit.sim.step(stop, DT_S);
     });
@@ -86,7 +86,7 @@ fn measure(grid: &OccupancyGrid, kind: SimulatorKind, time: Duration) -> String 
 /// Steps a second while the robot pushes a wall.
 fn measure_push(sim: &mut AnySim, time: Duration) -> f64 {
     sim.reset(RobotState::at_rest(Pose::new(PUSH_FROM.0, PUSH_FROM.1, 0.0)));
-    let command = Command::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
+    let command = WheelCommand::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
     for _ in 0..PUSH_STEPS {
         sim.step(command, DT_S);
     }
@@ -125,9 +125,9 @@ impl Circuit {
             self.hops += 1;
             self.left_m = HOP_M;
         }
-        let bearing = target.y.atan2(target.x);
-        let command = Command::Twist {
-            speed_mps: (2.0 * target.norm()).min(1.0) * bearing.cos().max(0.0),
+        let bearing = trig::atan2(target.y, target.x);
+        let command = WheelCommand::Twist {
+            speed_mps: (2.0 * target.norm()).min(1.0) * trig::cos(bearing).max(0.0),
             yaw_rate_radps: (3.0 * bearing).clamp(-1.5, 1.5),
         };
         let info = self.sim.step(command, DT_S);

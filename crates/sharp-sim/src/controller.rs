@@ -1,21 +1,21 @@
 //! From the waypoint of an action to wheel commands.
 //!
-//! The actions of the paper's policies are points that the robot's own controller drives to. The
-//! controller knows the robot's limits and its mean yaw gain, nothing of the noise.
+//! The actions of the paper's policies are points that the robot's own controller drives to. The controller
+//! knows the robot's limits and its mean yaw gain, but not the noise.
 
 use sharp_space::{Point, Pose, Vector, trig};
 
 use crate::robot::{Drive, RobotModel};
-use crate::state::{Command, RobotState};
+use crate::state::{RobotState, WheelCommand};
 
 /// Turn per bearing, 1/s: a quarter of a second to face the waypoint, well above the control period.
 const BEARING_GAIN_PS: f64 = 4.0;
-/// Bearing beyond which a robot turns in place: 60 degrees.
+/// Cosine of the bearing beyond which a robot turns in place: 60 degrees.
 const TURN_IN_PLACE_COS: f64 = 0.5;
 /// Least distance of the point steered at. Nearer points would turn the robot wildly as it arrives.
 const LOOK_AHEAD_M: f64 = 0.25;
 
-/// Drives a robot towards waypoints, ahead only.
+/// Drives a robot towards waypoints, forward only.
 #[derive(Clone, Copy, Debug)]
 pub struct WaypointController {
     drive: Drive,
@@ -26,7 +26,7 @@ pub struct WaypointController {
     action_s: f64,
 }
 
-/// What one action is after: set when it begins, so that the speed does not fade on arrival.
+/// The target of one action. It is fixed when the action begins, so that the speed does not drop on arrival.
 #[derive(Clone, Copy, Debug)]
 pub struct Aim {
     waypoint: Point,
@@ -65,22 +65,22 @@ impl WaypointController {
 
     /// The command for the next control period.
     #[must_use]
-    pub fn command(&self, state: &RobotState, aim: &Aim) -> Command {
+    pub fn command(&self, state: &RobotState, aim: &Aim) -> WheelCommand {
         self.towards(self.target(state, aim), aim.speed_mps)
     }
 
     /// The same, and what a waypoint turned by one radian would change: the yaw rate, rad/s, or the steering
     /// angle, rad; 0 where the robot already turns as much as it can.
     #[must_use]
-    pub fn command_and_slope(&self, state: &RobotState, aim: &Aim) -> (Command, f64) {
+    pub fn command_and_slope(&self, state: &RobotState, aim: &Aim) -> (WheelCommand, f64) {
         let target = self.target(state, aim);
         let command = self.towards(target, aim.speed_mps);
         let slope = match (self.drive, command) {
-            (Drive::Differential { .. }, Command::Twist { yaw_rate_radps, .. }) => {
+            (Drive::Differential { .. }, WheelCommand::Twist { yaw_rate_radps, .. }) => {
                 let saturates = (yaw_rate_radps * self.yaw_gain).abs() >= self.max_yaw_rate_radps;
                 if saturates || aim.speed_mps <= 0.0 { 0.0 } else { BEARING_GAIN_PS / self.yaw_gain }
             }
-            (Drive::Ackermann { wheelbase_m, max_steer_rad, .. }, Command::Steer { steer_rad, .. }) => {
+            (Drive::Ackermann { wheelbase_m, max_steer_rad, .. }, WheelCommand::Steer { steer_rad, .. }) => {
                 if steer_rad.abs() >= max_steer_rad {
                     0.0
                 } else {
@@ -92,31 +92,31 @@ impl WaypointController {
         (command, slope)
     }
 
-    /// The point steered at, as the robot sees it.
+    /// The point steered at, in the robot's frame.
     fn target(&self, state: &RobotState, aim: &Aim) -> Vector {
         let left_m = (aim.waypoint - state.pose.position).dot(&aim.direction);
         let beyond_m = (LOOK_AHEAD_M - left_m).max(0.0);
         state.pose.to_local(aim.waypoint + aim.direction * beyond_m)
     }
 
-    fn towards(&self, target: Vector, speed_mps: f64) -> Command {
+    fn towards(&self, target: Vector, speed_mps: f64) -> WheelCommand {
         match self.drive {
             Drive::Differential { .. } => self.turn_towards(target, speed_mps),
             Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => {
-                Command::Steer { speed_mps, steer_rad: pursue(target, wheelbase_m, max_steer_rad) }
+                WheelCommand::Steer { speed_mps, steer_rad: pursue(target, wheelbase_m, max_steer_rad) }
             }
         }
     }
 
-    fn turn_towards(&self, target: Vector, speed_mps: f64) -> Command {
+    fn turn_towards(&self, target: Vector, speed_mps: f64) -> WheelCommand {
         let bearing = trig::atan2(target.y, target.x);
-        // 1 straight ahead, 0 from the bearing on at which it turns in place.
+        // 1 straight ahead, 0 or less from the bearing at which it turns in place.
         let distance_m = target.norm();
         let cos = if distance_m > 0.0 { target.x / distance_m } else { 1.0 };
         let ahead = (cos - TURN_IN_PLACE_COS) / (1.0 - TURN_IN_PLACE_COS);
         let turn = (BEARING_GAIN_PS * bearing).clamp(-self.max_yaw_rate_radps, self.max_yaw_rate_radps);
         let moving = if speed_mps > 0.0 { 1.0 } else { 0.0 };
-        Command::Twist {
+        WheelCommand::Twist {
             speed_mps: speed_mps * ahead.max(0.0),
             yaw_rate_radps: moving * turn / self.yaw_gain,
         }

@@ -1,14 +1,14 @@
 //! The only place where the engine's types meet ours.
 //!
-//! The engine computes in single precision; it sees the world from the grid's lower-left corner,
-//! so that a map far from the origin loses nothing and a turned map stands straight.
+//! The engine computes in single precision. Its frame is that of the grid, with the origin in the lower-left
+//! corner, so that a map far from the world's origin loses no precision and walls are parallel to the axes.
 
 use parry2d::math::{Pose as EnginePose, Vector as EngineVector};
 use parry2d::shape::SharedShape;
 use sharp_space::{GridFrame, Heading, Pose, Vector};
 
+use crate::obstacle_map::Wall;
 use crate::rectangles::CellRectangle;
-use crate::world::Wall;
 
 /// The walls of the map as one shape in the grid's frame.
 #[derive(Clone)]
@@ -27,7 +27,7 @@ impl Obstacles {
     pub(crate) fn new(frame: &GridFrame, rectangles: &[CellRectangle]) -> Self {
         let cell = frame.resolution_m;
         let (width, height) = (frame.width as f64 * cell, frame.height as f64 * cell);
-        // Nobody leaves the map: a metre of wall around it.
+        // A wall of one metre around the map keeps the robot inside.
         let border = [
             slab(-1.0, -1.0, width + 2.0, 1.0),
             slab(-1.0, height, width + 2.0, 1.0),

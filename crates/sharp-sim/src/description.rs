@@ -1,4 +1,4 @@
-//! Reading robots and noises from RON, with errors that show the line they mean.
+//! Reading robots and noise models from RON, with errors that show the line.
 
 use serde::de::DeserializeOwned;
 use thiserror::Error;
@@ -6,13 +6,13 @@ use thiserror::Error;
 /// Longer lines are cut in messages, characters.
 const SHOWN_MAX: usize = 80;
 
-/// Text that is not what it should describe.
+/// Text that cannot be read as a robot or a noise model.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("line {line} {text:?}: {reason}")]
 pub struct SyntaxError {
-    /// Where it was noticed; the first line is 1.
+    /// The line, from 1.
     pub line: usize,
-    /// What stands in that line, cut if it is long.
+    /// The text of that line, cut if it is long.
     pub text: String,
     /// What is wrong with it.
     pub reason: String,

@@ -1,24 +1,24 @@
 //! The fast simulator: the wheel law and exact collision tests, no engine.
 //!
-//! For training, certification and rollouts. In free space it moves as [`PlanarSim`](crate::PlanarSim)
-//! does; an obstacle stops it, where the engine would let it push and graze.
+//! For training and for estimates of success. In free space it moves as [`PlanarSim`](crate::PlanarSim) does;
+//! an obstacle stops it, while the engine lets it push and graze.
 
 use std::sync::Arc;
 
 use sharp_space::{Heading, Pose, Vector, trig};
 
 use crate::contact::ContactGuard;
+use crate::obstacle_map::ObstacleMap;
 use crate::robot::RobotModel;
 use crate::simulator::{Simulator, StepInfo};
-use crate::state::{Command, RobotState};
+use crate::state::{RobotState, WheelCommand};
 use crate::wheels::Wheels;
-use crate::world::World;
 
-/// A robot whose way ends at obstacles: a step that would collide leaves it where it was, at rest,
-/// its wheels turning. Put inside an obstacle, it stays there.
+/// A robot that obstacles stop. A step that would collide leaves it where it was, at rest, with its wheels
+/// still turning. A robot that starts inside an obstacle cannot move.
 #[derive(Clone, Debug)]
 pub struct KinematicSim {
-    world: Arc<World>,
+    map: Arc<ObstacleMap>,
     wheels: Wheels,
     guard: ContactGuard,
     state: RobotState,
@@ -27,9 +27,9 @@ pub struct KinematicSim {
 impl KinematicSim {
     /// A robot at rest at the grid's origin.
     #[must_use]
-    pub fn new(world: Arc<World>, robot: &RobotModel) -> Self {
-        let state = RobotState::at_rest(world.frame().origin);
-        Self { wheels: Wheels::new(robot), guard: ContactGuard::default(), state, world }
+    pub fn new(map: Arc<ObstacleMap>, robot: &RobotModel) -> Self {
+        let state = RobotState::at_rest(map.frame().origin);
+        Self { wheels: Wheels::new(robot), guard: ContactGuard::default(), state, map }
     }
 }
 
@@ -39,7 +39,7 @@ impl Simulator for KinematicSim {
         self.guard.forget();
     }
 
-    fn step(&mut self, command: Command, dt_s: f64) -> StepInfo {
+    fn step(&mut self, command: WheelCommand, dt_s: f64) -> StepInfo {
         self.wheels.follow(&mut self.state, command, dt_s);
         let push = self.wheels.push(&self.state, dt_s);
         let velocity = self.state.velocity + push.velocity;
@@ -49,8 +49,8 @@ impl Simulator for KinematicSim {
             self.state.pose.to_world(velocity * dt_s),
             Heading::new(self.state.pose.heading.radians() + turn),
         );
-        let moved_m = velocity.norm() * dt_s + turn.abs() * self.world.cover_reach_m();
-        let is_free = self.guard.is_free(&self.world, &pose, moved_m);
+        let moved_m = velocity.norm() * dt_s + turn.abs() * self.map.cover_reach_m();
+        let is_free = self.guard.is_free(&self.map, &pose, moved_m);
         if is_free {
             self.state.pose = pose;
             // The velocity stays in the world while the body turns under it.

@@ -1,30 +1,31 @@
 //! Stochastic simulator of wheeled robots.
 //!
-//! A [`RobotModel`] is data, a [`World`] is the map ready for queries, a [`Simulator`] moves the
+//! A [`RobotModel`] is data, an [`ObstacleMap`] is the map ready for queries, a [`Simulator`] moves the
 //! robot a time step at a time, and a [`Vehicle`] adds controller and [`NoiseModel`]: its
 //! [`act`](Vehicle::act) is one action of the paper's stochastic path planning problem, "drive at
 //! this waypoint for half a second".
 //!
 //! ```
 //! use std::sync::Arc;
-//! use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, RobotModel, RobotState, Vehicle, World};
+//! use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, RobotModel, RobotState, Vehicle, ObstacleMap};
 //! use sharp_space::{OccupancyGrid, Point, Pose, Seed};
 //!
 //! let grid = OccupancyGrid::from_ascii(1.0, "......\n......\n......").unwrap();
 //! let robot = Arc::new(RobotModel::husky());
-//! let world = Arc::new(World::new(&grid, robot.footprint));
-//! let sim = KinematicSim::new(world, &robot);
+//! let map = Arc::new(ObstacleMap::new(&grid, robot.footprint));
+//! let sim = KinematicSim::new(map, &robot);
 //! let mut vehicle = Vehicle::new(sim, robot, NoiseModel::nominal(), ActionSettings::default());
 //! vehicle.reset(RobotState::at_rest(Pose::new(1.0, 1.5, 0.0)), Seed(1), 0);
 //! let report = vehicle.act(Point::new(1.5, 1.5));
 //! assert!(!report.contact && report.path_m > 0.1, "{report:?}");
 //! ```
 //!
-//! The feature `rigid3d` adds `RigidSim`, a body with four driven wheels on rapier3d, to check the
-//! others against; it is off by default, for it compiles a second engine.
+//! The feature `rigid3d` adds `RigidSim`, a body with four driven wheels on rapier3d, to check the others
+//! against; it is off by default, because it compiles a second engine.
 //!
-//! Everything random is keyed by (seed, episode, action): a clone of a vehicle is a fork that
-//! continues bit for bit as the original would.
+//! Everything random is keyed by (seed, episode, action), so a clone of a vehicle is a fork that continues
+//! bit for bit as the original would. Implement [`Simulator`] to bring another simulator; [`conformance`]
+//! tests it.
 
 mod contact;
 mod controller;
@@ -32,6 +33,7 @@ mod convert;
 mod description;
 mod kinematic;
 mod noise;
+mod obstacle_map;
 mod planar;
 mod rectangles;
 #[cfg(feature = "rigid3d")]
@@ -41,17 +43,18 @@ mod simulator;
 mod state;
 mod vehicle;
 mod wheels;
-mod world;
+
+pub mod conformance;
 
 pub use controller::{Aim, WaypointController};
 pub use description::SyntaxError;
 pub use kinematic::KinematicSim;
 pub use noise::{ActionNoise, EpisodeNoise, NoiseError, NoiseModel, STEER_PER_DRIFT_S, SlipperyPatches};
+pub use obstacle_map::{ObstacleMap, Wall};
 pub use planar::PlanarSim;
 #[cfg(feature = "rigid3d")]
 pub use rigid::RigidSim;
 pub use robot::{Drive, RobotError, RobotModel};
-pub use simulator::{AnySim, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
-pub use state::{Command, RobotState};
+pub use simulator::{AnySim, ForkSimulator, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
+pub use state::{RobotState, WheelCommand};
 pub use vehicle::{ActionReport, ActionSettings, Vehicle, VehicleSnapshot};
-pub use world::{Wall, World};

@@ -1,8 +1,7 @@
-//! What goes wrong: the stochastic part of the transition function T(x, a, x′) of the paper's SSP.
+//! Noise: the stochastic part of the transition function T(x, a, x′) of the paper's SSP.
 //!
-//! Every draw is keyed by (seed, episode, action), so neither forks nor threads nor the order of
-//! questions can change what happens. Some errors are drawn once an episode (a worn wheel, a
-//! wet floor), others with every action.
+//! Every draw is keyed by (seed, episode, action), so forks, threads and the order of calls change nothing.
+//! Some errors are drawn once per episode (a worn wheel, a wet floor), others for every action.
 
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,16 +11,16 @@ use thiserror::Error;
 
 use crate::description::{self, SyntaxError};
 use crate::robot::RobotModel;
-use crate::state::Command;
+use crate::state::WheelCommand;
 
 /// Side of a square of slippery floor, metres: about one action's travel.
 const PATCH_M: f64 = 0.5;
 /// Steering error of a car that drifts by 1 rad/s at 1 m/s. On the Limo's wheelbase it has 1.5 times
 /// the effect that the name promises; the values of the nominal noise were tuned with it.
 pub const STEER_PER_DRIFT_S: f64 = 0.3;
-/// A wheel that slips more does not drive at all.
+/// With more slip a wheel would not drive at all.
 const SLIP_MAX: f64 = 0.95;
-/// The largest factor that a name may have: beyond it no built-in noise is one that a robot could drive with.
+/// The largest factor that a name may have. With more, no robot could drive under any built-in noise.
 const FACTOR_MAX: f64 = 10.0;
 
 /// Why a noise model was refused.
@@ -54,7 +53,7 @@ pub enum NoiseError {
     },
 }
 
-/// How far reality strays from the command.
+/// How much the motion differs from the command.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseModel {
@@ -65,7 +64,7 @@ pub struct NoiseModel {
     pub slip_max: f64,
     /// Standard deviation of the pull to one side at 1 m/s, constant for an episode, rad/s.
     pub drift_sd_radps: f64,
-    /// A pull of this size in every episode, to a side drawn once an episode, rad/s at 1 m/s.
+    /// A pull of this size in every episode, to a side drawn once per episode, rad/s at 1 m/s.
     pub drift_bias_radps: f64,
     /// Standard deviation of each coordinate of the waypoint, metres: the paper's perturbed action.
     pub waypoint_sd_m: f64,
@@ -75,7 +74,7 @@ pub struct NoiseModel {
     pub delay_s: f64,
 }
 
-/// Half-metre squares of slippery floor, strewn anew every episode.
+/// Squares of slippery floor with sides of half a metre, drawn anew every episode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlipperyPatches {
@@ -95,7 +94,7 @@ impl NoiseModel {
         Self::built_in(include_str!("../assets/noise/none.ron"))
     }
 
-    /// What options are learnt and certified with.
+    /// The noise under which options are learnt and evaluated.
     #[must_use]
     pub fn nominal() -> Self {
         Self::built_in(include_str!("../assets/noise/nominal.ron"))
@@ -239,21 +238,21 @@ impl EpisodeNoise {
     #[must_use]
     pub fn distort(
         &self,
-        command: Command,
+        command: WheelCommand,
         action: &ActionNoise,
         robot: &RobotModel,
         position: Point,
-    ) -> Command {
+    ) -> WheelCommand {
         let extra_slip = self.extra_slip(position);
         let speed_factor = action.speed_gain * (1.0 - self.speed_slip - extra_slip).max(0.0);
         let yaw_factor = action.yaw_gain * (1.0 - self.yaw_slip - extra_slip).max(0.0);
         match command {
-            Command::Twist { speed_mps, yaw_rate_radps } => {
+            WheelCommand::Twist { speed_mps, yaw_rate_radps } => {
                 let speed_mps = speed_mps * speed_factor;
                 let drift_radps = self.drift_radps * speed_mps.abs() / robot.yaw_gain();
-                Command::Twist { speed_mps, yaw_rate_radps: yaw_rate_radps * yaw_factor + drift_radps }
+                WheelCommand::Twist { speed_mps, yaw_rate_radps: yaw_rate_radps * yaw_factor + drift_radps }
             }
-            Command::Steer { speed_mps, steer_rad } => Command::Steer {
+            WheelCommand::Steer { speed_mps, steer_rad } => WheelCommand::Steer {
                 speed_mps: speed_mps * speed_factor,
                 steer_rad: steer_rad * yaw_factor + self.drift_radps * STEER_PER_DRIFT_S,
             },
@@ -327,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_do_not_depend_on_the_order_of_questions() {
+    fn draws_do_not_depend_on_the_order_of_calls() {
         let noise = EpisodeNoise::new(&NoiseModel::harsh(), Seed(4), 7);
         let forwards: Vec<_> = (0..50).map(|i| noise.action(i)).collect();
         let fork = noise.clone();
@@ -345,8 +344,8 @@ mod tests {
         let action = noise.action(3);
         assert_eq!(action.waypoint_shift, Vector::zeros());
         for (robot, command) in [
-            (RobotModel::husky(), Command::Twist { speed_mps: 0.7, yaw_rate_radps: -0.4 }),
-            (RobotModel::limo(), Command::Steer { speed_mps: 0.7, steer_rad: -0.4 }),
+            (RobotModel::husky(), WheelCommand::Twist { speed_mps: 0.7, yaw_rate_radps: -0.4 }),
+            (RobotModel::limo(), WheelCommand::Steer { speed_mps: 0.7, steer_rad: -0.4 }),
         ] {
             assert_eq!(noise.distort(command, &action, &robot, Point::origin()), command);
         }
@@ -391,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn every_noise_of_the_greatest_factor_is_valid() {
+    fn every_noise_with_the_largest_factor_is_valid() {
         for name in NoiseModel::NAMES {
             let noise = NoiseModel::by_name(&format!("{name}*{FACTOR_MAX}")).expect(name);
             assert!(noise.validate().is_ok(), "{name}: {noise:?}");

@@ -1,10 +1,9 @@
 //! The rigid-body simulator: a box with four wheels on rapier's planar engine.
 //!
-//! The map is one static shape made of merged rectangles: a clone shares it, so a fork costs the
-//! same on any map. Wheels push by the same law as in [`KinematicSim`](crate::KinematicSim); the
-//! engine does contacts and friction at walls. There is an engine only while a wall is near: where
-//! nothing can be touched all that it does is to integrate, and [`Motion::glide`] does the same, bit
-//! for bit, in a tenth of the time.
+//! The map is one static shape made of merged rectangles: a clone shares it, so a fork costs the same on any
+//! map. Wheels push by the same law as in [`KinematicSim`](crate::KinematicSim); the engine does contacts and
+//! friction at walls. The engine exists only while a wall is near. Where nothing can be touched, it would
+//! only integrate, and [`PlanarMotion::glide`] does the same, bit for bit, in a tenth of the time.
 
 use std::fmt;
 use std::sync::Arc;
@@ -20,19 +19,19 @@ use sharp_space::Footprint;
 
 use crate::contact::ContactGuard;
 use crate::convert::{engine_vector, our_vector};
+use crate::obstacle_map::ObstacleMap;
 use crate::robot::RobotModel;
 use crate::simulator::{Simulator, StepInfo};
-use crate::state::{Command, RobotState};
-use crate::wheels::{Push, Wheels};
-use crate::world::World;
+use crate::state::{RobotState, WheelCommand};
+use crate::wheels::{WheelPush, Wheels};
 
 /// Friction of the body against walls: a bumper that slides rather than grips.
 const WALL_FRICTION: f32 = 0.3;
-/// One body against fixed walls sinks as deep with two as with the engine's four, and a step costs a
-/// sixth less.
+/// Iterations of the contact solver. With two instead of the engine's four, a body sinks no deeper into fixed
+/// walls, and a step costs a sixth less.
 const SOLVER_ITERATIONS: usize = 2;
-/// A wall further away than this cannot be felt: the engine foresees contacts from 2 cm on, by poses
-/// up to 2 cm old.
+/// A wall further away than this has no effect: the engine predicts contacts within 2 cm, from poses up to 2
+/// cm old.
 const FELT_WITHIN_M: f64 = 0.05;
 /// The engine limits turns to an eighth of a circle per step; this is well below.
 const TURN_MAX_RAD: f64 = 0.5;
@@ -40,12 +39,12 @@ const TURN_MAX_RAD: f64 = 0.5;
 /// A robot that pushes against obstacles and grazes them.
 #[derive(Clone)]
 pub struct PlanarSim {
-    world: Arc<World>,
+    map: Arc<ObstacleMap>,
     wheels: Wheels,
-    body: Body,
-    motion: Motion,
-    /// There while a wall is near.
-    engine: Option<Box<Engine>>,
+    body: PlanarBody,
+    motion: PlanarMotion,
+    /// Present while a wall is near.
+    engine: Option<Box<PlanarEngine>>,
     guard: ContactGuard,
     state: RobotState,
     felt_within_m: f64,
@@ -54,35 +53,36 @@ pub struct PlanarSim {
 impl PlanarSim {
     /// A robot at rest at the grid's origin.
     #[must_use]
-    pub fn new(world: Arc<World>, robot: &RobotModel) -> Self {
-        let body = Body {
+    pub fn new(map: Arc<ObstacleMap>, robot: &RobotModel) -> Self {
+        let body = PlanarBody {
             footprint: robot.footprint,
             mass_kg: robot.mass_kg,
             yaw_inertia_kgm2: robot.yaw_inertia_kgm2,
         };
-        let state = RobotState::at_rest(world.frame().origin);
+        let state = RobotState::at_rest(map.frame().origin);
         Self {
             wheels: Wheels::new(robot),
             body,
-            motion: Motion::new(&world, &state),
+            motion: PlanarMotion::new(&map, &state),
             engine: None,
             guard: ContactGuard::default(),
             state,
-            world,
+            map,
             felt_within_m: FELT_WITHIN_M,
         }
     }
 
     /// Lets the engine move the robot and returns true if it was pushed back.
     fn move_among_walls(&mut self, dt_s: f64) -> bool {
-        let engine =
-            self.engine.get_or_insert_with(|| Box::new(Engine::new(&self.world, &self.body, &self.motion)));
+        let engine = self
+            .engine
+            .get_or_insert_with(|| Box::new(PlanarEngine::new(&self.map, &self.body, &self.motion)));
         engine.step(&mut self.motion, dt_s)
     }
 
     fn read_state(&mut self) {
         let motion = &self.motion;
-        self.state.pose = self.world.obstacles().in_world(&motion.pose);
+        self.state.pose = self.map.obstacles().in_world(&motion.pose);
         self.state.velocity = our_vector(motion.pose.rotation.inverse_transform_vector(motion.linvel));
         self.state.yaw_rate_radps = f64::from(motion.angvel);
     }
@@ -97,19 +97,19 @@ impl fmt::Debug for PlanarSim {
 impl Simulator for PlanarSim {
     fn reset(&mut self, state: RobotState) {
         self.state = state;
-        self.motion = Motion::new(&self.world, &state);
+        self.motion = PlanarMotion::new(&self.map, &state);
         self.engine = None;
         self.guard.forget();
     }
 
-    fn step(&mut self, command: Command, dt_s: f64) -> StepInfo {
+    fn step(&mut self, command: WheelCommand, dt_s: f64) -> StepInfo {
         self.wheels.follow(&mut self.state, command, dt_s);
         let before = self.state.pose;
         self.motion.add(&self.wheels.push(&self.state, dt_s));
         let turn_rad = f64::from(self.motion.angvel.abs()) * dt_s;
-        let way_m = f64::from(self.motion.linvel.length()) * dt_s + turn_rad * self.world.cover_reach_m();
+        let way_m = f64::from(self.motion.linvel.length()) * dt_s + turn_rad * self.map.cover_reach_m();
         let room_m = way_m + self.felt_within_m;
-        if turn_rad < TURN_MAX_RAD && self.guard.has_room(&self.world, &before, room_m) {
+        if turn_rad < TURN_MAX_RAD && self.guard.has_room(&self.map, &before, room_m) {
             self.engine = None;
             self.motion.glide(dt_s);
             self.read_state();
@@ -120,8 +120,8 @@ impl Simulator for PlanarSim {
         self.read_state();
         let after = self.state.pose;
         let turned_rad = before.heading.turn_to(after.heading).abs();
-        let moved_m = before.distance_m(&after) + turned_rad * self.world.cover_reach_m();
-        let is_free = self.guard.is_free(&self.world, &after, moved_m);
+        let moved_m = before.distance_m(&after) + turned_rad * self.map.cover_reach_m();
+        let is_free = self.guard.is_free(&self.map, &after, moved_m);
         StepInfo { in_contact: touched || !is_free }
     }
 
@@ -132,15 +132,15 @@ impl Simulator for PlanarSim {
 
 /// How the body moves, in the engine's frame and precision.
 #[derive(Clone, Copy)]
-struct Motion {
+struct PlanarMotion {
     pose: EnginePose,
     linvel: EngineVector,
     angvel: f32,
 }
 
-impl Motion {
-    fn new(world: &World, state: &RobotState) -> Self {
-        let pose = world.obstacles().to_engine(&state.pose);
+impl PlanarMotion {
+    fn new(map: &ObstacleMap, state: &RobotState) -> Self {
+        let pose = map.obstacles().to_engine(&state.pose);
         Self {
             pose,
             linvel: pose.rotation.transform_vector(engine_vector(state.velocity)),
@@ -148,12 +148,12 @@ impl Motion {
         }
     }
 
-    fn add(&mut self, push: &Push) {
+    fn add(&mut self, push: &WheelPush) {
         self.linvel += self.pose.rotation.transform_vector(engine_vector(push.velocity));
         self.angvel += push.yaw_rate_radps as f32;
     }
 
-    /// Moves on as the engine does where nothing is touched: the same operations in the same order.
+    /// Moves as the engine does where nothing is touched: the same operations in the same order.
     fn glide(&mut self, dt_s: f64) {
         let dt_s = dt_s as f32 / SOLVER_ITERATIONS as f32;
         for _ in 0..SOLVER_ITERATIONS {
@@ -167,7 +167,7 @@ impl Motion {
 
 /// What the engine needs to know of the robot.
 #[derive(Clone, Copy)]
-struct Body {
+struct PlanarBody {
     footprint: Footprint,
     mass_kg: f64,
     yaw_inertia_kgm2: f64,
@@ -175,8 +175,8 @@ struct Body {
 
 /// The engine with the robot among the walls; cloning it forks the simulation.
 #[derive(Clone)]
-struct Engine {
-    workspace: Workspace,
+struct PlanarEngine {
+    buffers: PlanarBuffers,
     parameters: IntegrationParameters,
     islands: IslandManager,
     broad_phase: BroadPhaseBvh,
@@ -190,12 +190,12 @@ struct Engine {
     robot_shape: ColliderHandle,
 }
 
-impl Engine {
-    fn new(world: &World, body: &Body, motion: &Motion) -> Self {
+impl PlanarEngine {
+    fn new(map: &ObstacleMap, body: &PlanarBody, motion: &PlanarMotion) -> Self {
         let mut bodies = RigidBodySet::new();
         let mut colliders = ColliderSet::new();
         // Without a parent: a fixed body each would cost time at every step.
-        colliders.insert(ColliderBuilder::new(world.obstacles().shape()).friction(WALL_FRICTION));
+        colliders.insert(ColliderBuilder::new(map.obstacles().shape()).friction(WALL_FRICTION));
         let inertia = body.yaw_inertia_kgm2 as f32;
         let mass = MassProperties::new(EngineVector::ZERO, body.mass_kg as f32, inertia);
         let robot = bodies.insert(
@@ -206,7 +206,7 @@ impl Engine {
         let robot_shape =
             colliders.insert_with_parent(shape.density(0.0).friction(WALL_FRICTION), robot, &mut bodies);
         Self {
-            workspace: Workspace::default(),
+            buffers: PlanarBuffers::default(),
             parameters: IntegrationParameters {
                 num_solver_iterations: SOLVER_ITERATIONS,
                 ..IntegrationParameters::default()
@@ -225,12 +225,12 @@ impl Engine {
     }
 
     /// Moves everything on by `dt_s`, the robot from `motion`; returns true if it was pushed back.
-    fn step(&mut self, motion: &mut Motion, dt_s: f64) -> bool {
+    fn step(&mut self, motion: &mut PlanarMotion, dt_s: f64) -> bool {
         let body = &mut self.bodies[self.robot];
         body.set_linvel(motion.linvel, true);
         body.set_angvel(motion.angvel, true);
         self.parameters.dt = dt_s as f32;
-        self.workspace.pipeline.step(
+        self.buffers.pipeline.step(
             EngineVector::ZERO,
             &self.parameters,
             &mut self.islands,
@@ -241,12 +241,12 @@ impl Engine {
             &mut self.impulse_joints,
             &mut self.multibody_joints,
             &mut self.soft_bodies,
-            &mut self.workspace.ccd_solver,
+            &mut self.buffers.ccd_solver,
             &(),
             &(),
         );
         let body = &self.bodies[self.robot];
-        *motion = Motion { pose: *body.position(), linvel: body.linvel(), angvel: body.angvel() };
+        *motion = PlanarMotion { pose: *body.position(), linvel: body.linvel(), angvel: body.angvel() };
         self.narrow_phase
             .contact_pairs_with(self.robot_shape)
             .any(|pair| pair.total_impulse_magnitude() > 0.0)
@@ -255,12 +255,12 @@ impl Engine {
 
 /// Buffers that the engine reuses; no state of the simulation.
 #[derive(Default)]
-struct Workspace {
+struct PlanarBuffers {
     pipeline: PhysicsPipeline,
     ccd_solver: CCDSolver,
 }
 
-impl Clone for Workspace {
+impl Clone for PlanarBuffers {
     fn clone(&self) -> Self {
         Self::default()
     }
@@ -285,8 +285,8 @@ mod tests {
         OccupancyGrid::new(frame, cells.collect()).expect("a sound grid")
     }
 
-    fn random_command(stream: &mut impl Rng) -> Command {
-        Command::Twist {
+    fn random_command(stream: &mut impl Rng) -> WheelCommand {
+        WheelCommand::Twist {
             speed_mps: stream.random_range(0.0..1.0),
             yaw_rate_radps: stream.random_range(-2.0..2.0),
         }
@@ -300,13 +300,13 @@ mod tests {
             (RobotModel::limo(), 1.0 / 60.0),
             (RobotModel::limo(), 1.0 / 20.0),
         ] {
-            let world = Arc::new(World::new(&pillars(), robot.footprint));
-            let mut sim = PlanarSim::new(world.clone(), &robot);
-            let mut always = PlanarSim { felt_within_m: f64::INFINITY, ..PlanarSim::new(world, &robot) };
+            let map = Arc::new(ObstacleMap::new(&pillars(), robot.footprint));
+            let mut sim = PlanarSim::new(map.clone(), &robot);
+            let mut always = PlanarSim { felt_within_m: f64::INFINITY, ..PlanarSim::new(map, &robot) };
             let stream = &mut Seed(3).stream("commands", 0);
             let (mut glided, mut near) = (0, 0);
             for _ in 0..50 {
-                let start = sim.world.frame().from_grid(Vector::new(225.0, 225.0));
+                let start = sim.map.frame().from_grid(Vector::new(225.0, 225.0));
                 let start = RobotState::rolling(Pose::at(start, Heading::new(0.3)), 0.3);
                 sim.reset(start);
                 always.reset(start);

@@ -1,7 +1,7 @@
 //! Blocked cells merged into few rectangles.
 //!
-//! An engine that meets a wall made of single cells catches on their seams: a robot that grazes
-//! such a wall sticks. Long rectangles have few seams, and cost less.
+//! In an engine, a robot that grazes a wall of single cells gets stuck at the seams between them. Long
+//! rectangles have few seams and cost less time.
 
 use sharp_space::{Cell, OccupancyGrid};
 
@@ -109,6 +109,6 @@ mod tests {
             ########",
         )
         .unwrap();
-        assert_eq!(merge_blocked_cells(&grid).len(), 4, "one a wall");
+        assert_eq!(merge_blocked_cells(&grid).len(), 4, "one for each wall");
     }
 }

@@ -1,9 +1,8 @@
 //! The three-dimensional cross-check: a chassis on four motor-driven wheels on rapier3d.
 //!
-//! It shares the limits of commands with the other simulators, but not the wheel law: friction
-//! between balls and floor moves the robot, and gravity holds it down. The skid ratio and the turning
-//! radius that the others compute come out of the contacts. Only with the feature `rigid3d`, and
-//! several times slower.
+//! It shares the limits of commands with the other simulators, but not the wheel law: friction between balls
+//! and floor moves the robot, and gravity holds it down. The skid ratio and the turning radius, which the
+//! others compute, result from the contacts. Only with the feature `rigid3d`, and several times slower.
 
 use std::fmt;
 use std::sync::Arc;
@@ -19,14 +18,14 @@ use rapier3d::geometry::{
 };
 use rapier3d::math::{Pose as EnginePose, Rotation, Vector as EngineVector};
 use rapier3d::pipeline::PhysicsPipeline;
-use sharp_space::{Heading, Pose, Vector};
+use sharp_space::{Heading, Pose, Vector, trig};
 
 use crate::contact::ContactGuard;
+use crate::obstacle_map::ObstacleMap;
 use crate::robot::{Drive, RobotModel};
 use crate::simulator::{Simulator, StepInfo};
-use crate::state::{Command, RobotState};
+use crate::state::{RobotState, WheelCommand};
 use crate::wheels::{GRAVITY_MPS2, Wheels};
-use crate::world::World;
 
 /// Friction of the body against walls, as in [`PlanarSim`](crate::PlanarSim).
 const WALL_FRICTION: f32 = 0.3;
@@ -34,13 +33,14 @@ const WALL_FRICTION: f32 = 0.3;
 const WALL_HEIGHT_M: f32 = 2.0;
 /// Share of the robot's mass in each wheel.
 const WHEEL_MASS_SHARE: f64 = 0.05;
-/// Radius of the wheels by the shorter of track and wheelbase. The data name none: on a flat floor
-/// it changes nothing.
+/// Radius of the wheels by the shorter of track and wheelbase. The robot files give no radius, because on a
+/// flat floor it changes nothing.
 const WHEEL_RADIUS_SHARE: f64 = 0.3;
 /// Damping of the wheels' motors, 1/s. The engine scales it by the joint's own inertia alone: a
 /// motor of 200 leaves a wheel too weak to skid.
 const MOTOR_GAIN_PS: f32 = 1e5;
-/// What a motor can do, by what friction asks of it: friction limits the drive, never the motor.
+/// Largest torque of a motor, as a multiple of what friction can need: friction limits the drive, and the
+/// motor never does.
 const MOTOR_RESERVE: f64 = 4.0;
 
 const CHASSIS: Group = Group::GROUP_1;
@@ -48,15 +48,14 @@ const WHEELS: Group = Group::GROUP_2;
 const WALLS: Group = Group::GROUP_3;
 const FLOOR: Group = Group::GROUP_4;
 
-/// A robot with four balls for wheels, which touch the floor alone: wheels of full width would
-/// climb the walls.
+/// A robot with four balls as wheels, which touch the floor only. Wheels of full width would climb the walls.
 pub struct RigidSim {
-    world: Arc<World>,
+    map: Arc<ObstacleMap>,
     wheels: Wheels,
-    build: Build,
+    build: RigidBodies,
     walls: SharedShape,
-    engine: Engine,
-    workspace: Workspace,
+    engine: RigidEngine,
+    buffers: RigidBuffers,
     guard: ContactGuard,
     state: RobotState,
 }
@@ -64,27 +63,27 @@ pub struct RigidSim {
 impl RigidSim {
     /// A robot at rest at the grid's origin.
     #[must_use]
-    pub fn new(world: Arc<World>, robot: &RobotModel) -> Self {
-        let build = Build::new(robot);
-        let state = RobotState::at_rest(world.frame().origin);
-        let walls = extrude(&world);
+    pub fn new(map: Arc<ObstacleMap>, robot: &RobotModel) -> Self {
+        let build = RigidBodies::new(robot);
+        let state = RobotState::at_rest(map.frame().origin);
+        let walls = extrude(&map);
         Self {
             wheels: Wheels::new(robot),
-            engine: Engine::new(&world, &build, walls.clone(), &state),
-            workspace: Workspace::default(),
+            engine: RigidEngine::new(&map, &build, walls.clone(), &state),
+            buffers: RigidBuffers::default(),
             guard: ContactGuard::default(),
             build,
             walls,
             state,
-            world,
+            map,
         }
     }
 
     fn read_state(&mut self) {
         let body = &self.engine.bodies[self.engine.chassis];
         let ahead = *body.rotation() * EngineVector::X;
-        let turn = Heading::new(f64::from(ahead.y).atan2(f64::from(ahead.x)));
-        let origin = self.world.frame().origin;
+        let turn = Heading::of(Vector::new(f64::from(ahead.x), f64::from(ahead.y)));
+        let origin = self.map.frame().origin;
         let place = body.translation();
         let heading = Heading::new(origin.heading.radians() + turn.radians());
         let position = origin.to_world(Vector::new(f64::from(place.x), f64::from(place.y)));
@@ -99,12 +98,12 @@ impl RigidSim {
 impl Clone for RigidSim {
     fn clone(&self) -> Self {
         Self {
-            world: self.world.clone(),
+            map: self.map.clone(),
             wheels: self.wheels,
             build: self.build,
             walls: self.walls.clone(),
             engine: self.engine.clone(),
-            workspace: Workspace::default(),
+            buffers: RigidBuffers::default(),
             guard: self.guard,
             state: self.state,
         }
@@ -120,21 +119,21 @@ impl fmt::Debug for RigidSim {
 impl Simulator for RigidSim {
     fn reset(&mut self, state: RobotState) {
         self.state = state;
-        self.engine = Engine::new(&self.world, &self.build, self.walls.clone(), &state);
-        self.workspace = Workspace::default();
+        self.engine = RigidEngine::new(&self.map, &self.build, self.walls.clone(), &state);
+        self.buffers = RigidBuffers::default();
         self.guard.forget();
     }
 
-    fn step(&mut self, command: Command, dt_s: f64) -> StepInfo {
+    fn step(&mut self, command: WheelCommand, dt_s: f64) -> StepInfo {
         self.wheels.follow(&mut self.state, command, dt_s);
         let before = self.state.pose;
         self.engine.drive(&self.build, &self.state);
-        let touched = self.engine.step(&mut self.workspace, dt_s);
+        let touched = self.engine.step(&mut self.buffers, dt_s);
         self.read_state();
         let after = self.state.pose;
         let turned_rad = before.heading.turn_to(after.heading).abs();
-        let moved_m = before.distance_m(&after) + turned_rad * self.world.cover_reach_m();
-        let is_free = self.guard.is_free(&self.world, &after, moved_m);
+        let moved_m = before.distance_m(&after) + turned_rad * self.map.cover_reach_m();
+        let is_free = self.guard.is_free(&self.map, &after, moved_m);
         StepInfo { in_contact: touched || !is_free }
     }
 
@@ -145,7 +144,7 @@ impl Simulator for RigidSim {
 
 /// The robot as bodies: sizes, masses and where the wheels are.
 #[derive(Clone, Copy)]
-struct Build {
+struct RigidBodies {
     drive: Drive,
     /// Of the chassis; as high as it is wide.
     half_extents: EngineVector,
@@ -157,7 +156,7 @@ struct Build {
     motor_torque_nm: f32,
 }
 
-impl Build {
+impl RigidBodies {
     fn new(robot: &RobotModel) -> Self {
         let (x, y) = (robot.wheelbase_m() / 2.0, robot.track_m() / 2.0);
         let wheel_radius_m = WHEEL_RADIUS_SHARE * robot.track_m().min(robot.wheelbase_m());
@@ -188,18 +187,18 @@ impl Build {
     }
 
     /// How the wheel at `contact` rolls and where it points if nothing slips.
-    fn roll(&self, contact: Vector, state: &RobotState) -> Roll {
+    fn roll(&self, contact: Vector, state: &RobotState) -> WheelRoll {
         let speed_mps = state.wheel_speed_mps;
         match self.drive {
             Drive::Differential { .. } => {
-                Roll { speed_mps: speed_mps - state.wheel_yaw_rate_radps * contact.y, angle_rad: 0.0 }
+                WheelRoll { speed_mps: speed_mps - state.wheel_yaw_rate_radps * contact.y, angle_rad: 0.0 }
             }
             Drive::Ackermann { wheelbase_m, .. } => {
                 // All wheels roll around one point on the line of the rear axle.
-                let curvature = state.steer_rad.tan() / wheelbase_m;
+                let curvature = trig::tan(state.steer_rad) / wheelbase_m;
                 let ahead = 1.0 - curvature * contact.y;
                 let left = curvature * (contact.x + wheelbase_m / 2.0);
-                Roll { speed_mps: speed_mps * ahead.hypot(left), angle_rad: left.atan2(ahead) }
+                WheelRoll { speed_mps: speed_mps * ahead.hypot(left), angle_rad: trig::atan2(left, ahead) }
             }
         }
     }
@@ -207,30 +206,30 @@ impl Build {
 
 /// How a wheel rolls.
 #[derive(Clone, Copy)]
-struct Roll {
+struct WheelRoll {
     speed_mps: f64,
     /// To the left of the chassis' axis.
     angle_rad: f64,
 }
 
-impl Roll {
+impl WheelRoll {
     /// The axis that it turns around, in the chassis' frame.
     fn axis(&self) -> EngineVector {
-        let (sin, cos) = self.angle_rad.sin_cos();
+        let (sin, cos) = trig::sin_cos(self.angle_rad);
         EngineVector::new(-sin as f32, cos as f32, 0.0)
     }
 }
 
 /// Buffers that the engine reuses; no state of the simulation.
 #[derive(Default)]
-struct Workspace {
+struct RigidBuffers {
     pipeline: PhysicsPipeline,
     ccd_solver: CCDSolver,
 }
 
 /// Everything in the engine that changes; cloning it forks the simulation.
 #[derive(Clone)]
-struct Engine {
+struct RigidEngine {
     parameters: IntegrationParameters,
     islands: IslandManager,
     broad_phase: BroadPhaseBvh,
@@ -245,8 +244,8 @@ struct Engine {
     axles: [ImpulseJointHandle; 4],
 }
 
-impl Engine {
-    fn new(world: &World, build: &Build, walls: SharedShape, state: &RobotState) -> Self {
+impl RigidEngine {
+    fn new(map: &ObstacleMap, build: &RigidBodies, walls: SharedShape, state: &RobotState) -> Self {
         let mut bodies = RigidBodySet::new();
         let mut colliders = ColliderSet::new();
         let mut joints = ImpulseJointSet::new();
@@ -256,7 +255,7 @@ impl Engine {
         let floor = floor.friction(build.wheel_friction).collision_groups(groups(FLOOR, WHEELS | CHASSIS));
         colliders.insert(floor);
 
-        let motion = Motion::new(world, build, state);
+        let motion = RigidMotion::new(map, build, state);
         let chassis =
             bodies.insert(motion.body(Vector::zeros()).additional_mass_properties(build.chassis_mass));
         let EngineVector { x, y, z } = build.half_extents;
@@ -297,7 +296,7 @@ impl Engine {
     }
 
     /// Tells the motors how fast to turn and the front wheels where to point.
-    fn drive(&mut self, build: &Build, state: &RobotState) {
+    fn drive(&mut self, build: &RigidBodies, state: &RobotState) {
         for (axle, contact) in self.axles.into_iter().zip(build.contacts) {
             let roll = build.roll(contact, state);
             let joint = self.impulse_joints.get_mut(axle, false).expect("joints are never removed");
@@ -307,10 +306,10 @@ impl Engine {
         }
     }
 
-    /// Moves everything on and returns true if the chassis was pushed back.
-    fn step(&mut self, workspace: &mut Workspace, dt_s: f64) -> bool {
+    /// Moves everything and returns true if the chassis was pushed back.
+    fn step(&mut self, buffers: &mut RigidBuffers, dt_s: f64) -> bool {
         self.parameters.dt = dt_s as f32;
-        workspace.pipeline.step(
+        buffers.pipeline.step(
             EngineVector::new(0.0, 0.0, -GRAVITY_MPS2 as f32),
             &self.parameters,
             &mut self.islands,
@@ -321,7 +320,7 @@ impl Engine {
             &mut self.impulse_joints,
             &mut self.multibody_joints,
             &mut self.soft_bodies,
-            &mut workspace.ccd_solver,
+            &mut buffers.ccd_solver,
             &(),
             &(),
         );
@@ -332,16 +331,16 @@ impl Engine {
 }
 
 /// Where the robot is and how it moves when a simulation begins.
-struct Motion {
+struct RigidMotion {
     /// Of the chassis, at the height of the axles, seen from the grid's lower-left corner.
     pose: EnginePose,
     linvel: EngineVector,
     angvel: EngineVector,
 }
 
-impl Motion {
-    fn new(world: &World, build: &Build, state: &RobotState) -> Self {
-        let origin = world.frame().origin;
+impl RigidMotion {
+    fn new(map: &ObstacleMap, build: &RigidBodies, state: &RobotState) -> Self {
+        let origin = map.frame().origin;
         let place = origin.to_local(state.pose.position);
         let turn = origin.heading.turn_to(state.pose.heading) as f32;
         let height = build.wheel_radius_m as f32;
@@ -369,8 +368,8 @@ impl Motion {
 }
 
 /// The walls of `world` as one shape: a clone of the simulation shares it.
-fn extrude(world: &World) -> SharedShape {
-    let blocks = world.walls().map(|wall| {
+fn extrude(map: &ObstacleMap) -> SharedShape {
+    let blocks = map.walls().map(|wall| {
         let center = EngineVector::new(wall.center.x as f32, wall.center.y as f32, WALL_HEIGHT_M / 2.0);
         let (x, y) = (wall.half_extents.x as f32, wall.half_extents.y as f32);
         let block = SharedShape::cuboid(x, y, WALL_HEIGHT_M / 2.0);

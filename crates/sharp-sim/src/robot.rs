@@ -1,15 +1,15 @@
 //! Robots as data: the outline, the wheels and the limits of a robot of the paper's evaluation.
 //!
-//! A robot is a RON file (`assets/robots` of this crate); nothing else in the project knows one by name. The
-//! reference point is the centre of the footprint, which is also the middle between the axles.
+//! A robot is a RON file (`assets/robots` of this crate); no other code of the project depends on a robot's
+//! name. The reference point is the centre of the footprint, which is also the middle between the axles.
 
 use serde::{Deserialize, Serialize};
-use sharp_space::{Footprint, FootprintError};
+use sharp_space::{Footprint, FootprintError, trig};
 use thiserror::Error;
 
 use crate::description::{self, SyntaxError};
 
-/// Longer names do not fit a table.
+/// Longer names do not fit into a table, characters.
 const NAME_MAX: usize = 64;
 
 /// Why a robot's description was refused.
@@ -19,7 +19,7 @@ pub enum RobotError {
     /// The text is not a robot in RON.
     #[error("robot description: {0}")]
     Syntax(#[from] SyntaxError),
-    /// The name says nothing.
+    /// The name is empty, too long or cannot be printed.
     #[error("robot name is {name:?}, must be 1 to {NAME_MAX} characters that can be printed")]
     Name {
         /// The name.
@@ -42,12 +42,12 @@ pub enum RobotError {
         field: &'static str,
         /// Its value.
         value: f64,
-        /// What would be right.
+        /// What is allowed.
         expected: String,
     },
 }
 
-/// How the wheels stand and turn.
+/// The wheels and how they steer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Drive {
@@ -123,8 +123,8 @@ impl RobotModel {
     /// Reads a robot from the text of a RON file.
     ///
     /// # Errors
-    /// Returns an error that names the first unreadable place, or the first field out of range, its
-    /// value and what would be right.
+    /// Returns an error that names the first unreadable place, or the first field out of range, its value and
+    /// what is allowed.
     pub fn from_ron(text: &str) -> Result<Self, RobotError> {
         let robot: Self = description::parse(text)?;
         robot.validate()?;
@@ -136,7 +136,7 @@ impl RobotModel {
     pub fn min_turning_radius_m(&self) -> f64 {
         match self.drive {
             Drive::Differential { .. } => 0.0,
-            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => wheelbase_m / max_steer_rad.tan(),
+            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => wheelbase_m / trig::tan(max_steer_rad),
         }
     }
 
@@ -191,8 +191,8 @@ impl RobotModel {
             positive("drive.steer_rate_radps", steer_rate_radps, 100.0)?;
         }
         positive("mass_kg", self.mass_kg, 1e5)?;
-        // The wheel law corrects a whole slip in one step; a body that is easier to turn than two
-        // point masses at the wheels would overshoot by more than the slip and shake itself apart.
+        // The wheel law corrects a whole slip in one step; a body that is easier to turn than two point
+        // masses at the wheels would overshoot by more than the slip, and its motion would diverge.
         let least = 0.5 * self.mass_kg * 0.25 * (self.wheelbase_m().powi(2) + self.track_m().powi(2));
         self.require("yaw_inertia_kgm2", self.yaw_inertia_kgm2, (least * 1e3).ceil() / 1e3, 1e6)?;
         positive("wheel_friction", self.wheel_friction, 10.0)?;

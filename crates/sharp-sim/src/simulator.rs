@@ -1,6 +1,6 @@
 //! What a simulator is, and the choice between ours.
 
-use std::fmt;
+use std::fmt::{self, Debug};
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -8,23 +8,69 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::kinematic::KinematicSim;
+use crate::obstacle_map::ObstacleMap;
 use crate::planar::PlanarSim;
 #[cfg(feature = "rigid3d")]
 use crate::rigid::RigidSim;
 use crate::robot::RobotModel;
-use crate::state::{Command, RobotState};
-use crate::world::World;
+use crate::state::{RobotState, WheelCommand};
 
-/// Moves a robot; a clone is a fork that continues on its own, bit for bit.
-pub trait Simulator: Clone + Send {
-    /// Puts the robot into `state`; nothing of the past remains.
+/// Moves a robot in small time steps.
+///
+/// A simulator holds one robot in one map. It is deterministic: all noise comes in through the commands, so
+/// equal states and equal commands give equal bits. Implement the three methods below and derive `Clone`;
+/// [`ForkSimulator`] then comes by itself.
+/// [`conformance::check_simulator`](crate::conformance::check_simulator) tests an implementation.
+///
+/// `Box<dyn Simulator>` is a simulator too, so that [`Vehicle`](crate::Vehicle) drives one that was chosen at
+/// run time as well as a concrete one.
+pub trait Simulator: ForkSimulator + Debug + Send + Sync {
+    /// Puts the robot into `state`, in which [`state`](Self::state) then is exactly. Nothing of the past
+    /// remains.
     fn reset(&mut self, state: RobotState);
 
-    /// Lets the wheels follow `command` for `dt_s` seconds, at most 1/20 s for a stable drive.
-    fn step(&mut self, command: Command, dt_s: f64) -> StepInfo;
+    /// Lets the wheels follow `command` for `dt_s` seconds, above 0 and at most 1/20 s for a stable drive.
+    ///
+    /// Reports contact if the robot's outline met an obstacle or the border of the map. The robot never ends
+    /// a step inside of an obstacle; an engine may let it sink in by up to 4 cm.
+    fn step(&mut self, command: WheelCommand, dt_s: f64) -> StepInfo;
 
-    /// The state of the robot.
+    /// The state of the robot: finite after every step with a finite command.
     fn state(&self) -> &RobotState;
+}
+
+/// Forks a simulator of unknown type. Every simulator that is `Clone` has it.
+pub trait ForkSimulator {
+    /// A copy that continues on its own, bit for bit as the original would.
+    ///
+    /// To copy a `Box<dyn Simulator>`, clone it: `fork` would put the box into another box.
+    fn fork(&self) -> Box<dyn Simulator>;
+}
+
+impl<S: Simulator + Clone + 'static> ForkSimulator for S {
+    fn fork(&self) -> Box<dyn Simulator> {
+        Box::new(self.clone())
+    }
+}
+
+impl Clone for Box<dyn Simulator> {
+    fn clone(&self) -> Self {
+        (**self).fork()
+    }
+}
+
+impl Simulator for Box<dyn Simulator> {
+    fn reset(&mut self, state: RobotState) {
+        (**self).reset(state);
+    }
+
+    fn step(&mut self, command: WheelCommand, dt_s: f64) -> StepInfo {
+        (**self).step(command, dt_s)
+    }
+
+    fn state(&self) -> &RobotState {
+        (**self).state()
+    }
 }
 
 /// What happened in a step besides the motion.
@@ -47,6 +93,19 @@ pub enum SimulatorKind {
     Rigid,
 }
 
+impl SimulatorKind {
+    /// A simulator of this kind, the robot at rest at the grid's origin.
+    #[must_use]
+    pub fn build(self, map: Arc<ObstacleMap>, robot: &RobotModel) -> Box<dyn Simulator> {
+        match self {
+            Self::Kinematic => Box::new(KinematicSim::new(map, robot)),
+            Self::Planar => Box::new(PlanarSim::new(map, robot)),
+            #[cfg(feature = "rigid3d")]
+            Self::Rigid => Box::new(RigidSim::new(map, robot)),
+        }
+    }
+}
+
 /// A name that belongs to no simulator of this build.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
@@ -54,7 +113,7 @@ pub enum UnknownSimulator {
     /// There is none of that name.
     #[error("simulator {0:?} is unknown, must be rapier2d (or planar), kinematic or rapier3d (or rigid)")]
     Name(String),
-    /// It was left out of this build.
+    /// It is not compiled into this build.
     #[error(
         "simulator {0:?} is not compiled in, must be rapier2d or kinematic; \
          cargo build --release -p sharp-cli --features rigid3d adds it"
@@ -105,12 +164,12 @@ pub enum AnySim {
 impl AnySim {
     /// A simulator of the given kind, the robot at rest at the grid's origin.
     #[must_use]
-    pub fn new(kind: SimulatorKind, world: Arc<World>, robot: &RobotModel) -> Self {
+    pub fn new(kind: SimulatorKind, map: Arc<ObstacleMap>, robot: &RobotModel) -> Self {
         match kind {
-            SimulatorKind::Kinematic => Self::Kinematic(KinematicSim::new(world, robot)),
-            SimulatorKind::Planar => Self::Planar(Box::new(PlanarSim::new(world, robot))),
+            SimulatorKind::Kinematic => Self::Kinematic(KinematicSim::new(map, robot)),
+            SimulatorKind::Planar => Self::Planar(Box::new(PlanarSim::new(map, robot))),
             #[cfg(feature = "rigid3d")]
-            SimulatorKind::Rigid => Self::Rigid(Box::new(RigidSim::new(world, robot))),
+            SimulatorKind::Rigid => Self::Rigid(Box::new(RigidSim::new(map, robot))),
         }
     }
 }
@@ -125,7 +184,7 @@ impl Simulator for AnySim {
         }
     }
 
-    fn step(&mut self, command: Command, dt_s: f64) -> StepInfo {
+    fn step(&mut self, command: WheelCommand, dt_s: f64) -> StepInfo {
         match self {
             Self::Kinematic(sim) => sim.step(command, dt_s),
             Self::Planar(sim) => sim.step(command, dt_s),

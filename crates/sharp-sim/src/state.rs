@@ -1,9 +1,9 @@
-//! What changes while a robot moves, and what it can be told.
+//! The state of a robot, and the commands to its wheels.
 
 use serde::{Deserialize, Serialize};
 use sharp_space::{Pose, Vector};
 
-/// The state of a robot; together with the noise it decides the future.
+/// The state of a robot. Together with commands and noise it determines how the robot moves on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotState {
     /// Where the centre of the footprint is.
@@ -48,9 +48,9 @@ impl RobotState {
     }
 }
 
-/// What the wheels are told.
+/// A command to the wheels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Command {
+pub enum WheelCommand {
     /// Speed and turn of the wheels; a skid-steered body follows with its yaw gain.
     Twist {
         /// Metres per second ahead.

@@ -1,7 +1,7 @@
-//! One action of the SSP: the unit that policies, learning and execution share.
+//! One action of the stochastic path planning problem: the unit that policies, learning and execution share.
 //!
-//! A policy picks a waypoint; the vehicle's controller drives at it for a fixed time under noise,
-//! and the report says what came of it.
+//! A policy picks a waypoint; the vehicle's controller drives at it for a fixed time under noise, and a
+//! report says what happened.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -13,9 +13,9 @@ use crate::controller::WaypointController;
 use crate::noise::{ActionNoise, EpisodeNoise, NoiseModel};
 use crate::robot::{Drive, RobotModel};
 use crate::simulator::Simulator;
-use crate::state::{Command, RobotState};
+use crate::state::{RobotState, WheelCommand};
 
-/// Speed of backing off, metres per second: a walk away from what was just hit.
+/// Speed of backing off, metres per second: slow, because an obstacle is near.
 const BACK_OFF_MPS: f64 = 0.3;
 
 /// How an action is timed.
@@ -62,26 +62,27 @@ pub struct Vehicle<S> {
     /// Number of the next action; keys its noise.
     action: u64,
     /// Commands under way to the wheels, oldest first.
-    delayed: VecDeque<Command>,
+    delayed: VecDeque<WheelCommand>,
 }
 
-/// What came of an action.
+/// The result of an action.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActionReport {
     /// The state at its beginning.
     pub before: RobotState,
     /// The state at its end.
     pub after: RobotState,
-    /// True if the robot was in contact at any step; after backing off: still at the end.
+    /// True if the robot was in contact at any step. After backing off: if it still was in contact at the
+    /// end.
     pub contact: bool,
     /// How long it took, seconds.
     pub time_s: f64,
-    /// How far the robot moved, metres along its way.
+    /// Length of the path driven, metres.
     pub path_m: f64,
 }
 
-/// Everything that changes in a [`Vehicle`], the simulator's contacts included: whoever restores it
-/// continues bit for bit.
+/// Everything that changes in a [`Vehicle`], the simulator's contacts included. A vehicle that is restored
+/// from it continues bit for bit.
 #[derive(Clone, Debug)]
 pub struct VehicleSnapshot<S> {
     sim: S,
@@ -89,7 +90,7 @@ pub struct VehicleSnapshot<S> {
     seed: Seed,
     episode: u64,
     action: u64,
-    delayed: VecDeque<Command>,
+    delayed: VecDeque<WheelCommand>,
 }
 
 impl<S: Simulator> Vehicle<S> {
@@ -120,12 +121,12 @@ impl<S: Simulator> Vehicle<S> {
         (self.seed, self.episode, self.action) = (seed, episode, 0);
         let periods = (self.model.delay_s * self.settings.control_hz).round() as usize;
         let current = match self.robot.drive {
-            Drive::Differential { .. } => Command::Twist {
+            Drive::Differential { .. } => WheelCommand::Twist {
                 speed_mps: state.wheel_speed_mps,
                 yaw_rate_radps: state.wheel_yaw_rate_radps,
             },
             Drive::Ackermann { .. } => {
-                Command::Steer { speed_mps: state.wheel_speed_mps, steer_rad: state.steer_rad }
+                WheelCommand::Steer { speed_mps: state.wheel_speed_mps, steer_rad: state.steer_rad }
             }
         };
         self.delayed.clear();
@@ -137,9 +138,9 @@ impl<S: Simulator> Vehicle<S> {
         self.act_at(waypoint, self.robot.max_speed_mps)
     }
 
-    /// Drives towards `waypoint` for one action, not faster than `speed_max_mps`: a far waypoint
-    /// approached slowly keeps its direction where a near one would lose it to noise. A waypoint
-    /// that is not finite asks for a stop.
+    /// Drives towards `waypoint` for one action, not faster than `speed_max_mps`. Noise changes the direction
+    /// to a far waypoint less than that to a near one, so a far waypoint and a low speed keep the direction
+    /// better. A waypoint that is not finite asks for a stop.
     pub fn act_at(&mut self, waypoint: Point, speed_max_mps: f64) -> ActionReport {
         let noise = self.begin_action();
         let aim = self.controller.aim(&self.state().pose, waypoint + noise.waypoint_shift, speed_max_mps);
@@ -161,8 +162,10 @@ impl<S: Simulator> Vehicle<S> {
         let noise = self.begin_action();
         let distance_m = distance_m.min(self.robot.recovery_reverse_m);
         let command = match self.robot.drive {
-            Drive::Differential { .. } => Command::Twist { speed_mps: -BACK_OFF_MPS, yaw_rate_radps: 0.0 },
-            Drive::Ackermann { .. } => Command::Steer { speed_mps: -BACK_OFF_MPS, steer_rad: 0.0 },
+            Drive::Differential { .. } => {
+                WheelCommand::Twist { speed_mps: -BACK_OFF_MPS, yaw_rate_radps: 0.0 }
+            }
+            Drive::Ackermann { .. } => WheelCommand::Steer { speed_mps: -BACK_OFF_MPS, steer_rad: 0.0 },
         };
         let time_max_s = 1.0 + 2.0 * distance_m / BACK_OFF_MPS;
         let mut report = self.blank_report();
@@ -236,7 +239,7 @@ impl<S: Simulator> Vehicle<S> {
     }
 
     /// Sends `command` for one control period and adds what happens to `report`.
-    fn hold(&mut self, command: Command, noise: &ActionNoise, report: &mut ActionReport) {
+    fn hold(&mut self, command: WheelCommand, noise: &ActionNoise, report: &mut ActionReport) {
         self.delayed.push_back(command);
         let command = self.delayed.pop_front().expect("one was just pushed");
         let command = self.noise.distort(command, noise, &self.robot, self.state().pose.position);

@@ -7,7 +7,7 @@
 use sharp_space::{Vector, trig, wrap_angle};
 
 use crate::robot::{Drive, RobotModel};
-use crate::state::{Command, RobotState};
+use crate::state::{RobotState, WheelCommand};
 
 pub(crate) const GRAVITY_MPS2: f64 = 9.81;
 
@@ -27,7 +27,7 @@ pub(crate) struct Wheels {
 
 /// A sudden change of velocity, in the body's frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Push {
+pub(crate) struct WheelPush {
     pub(crate) velocity: Vector,
     pub(crate) yaw_rate_radps: f64,
 }
@@ -46,24 +46,26 @@ impl Wheels {
     }
 
     /// Lets the wheels follow `command` for `dt_s` as fast as the motors can.
-    pub(crate) fn follow(&self, state: &mut RobotState, command: Command, dt_s: f64) {
+    pub(crate) fn follow(&self, state: &mut RobotState, command: WheelCommand, dt_s: f64) {
         let speed_mps = match command {
-            Command::Twist { speed_mps, .. } | Command::Steer { speed_mps, .. } => speed_mps,
+            WheelCommand::Twist { speed_mps, .. } | WheelCommand::Steer { speed_mps, .. } => speed_mps,
         };
         state.wheel_speed_mps = approach(state.wheel_speed_mps, speed_mps, self.max_accel_mps2 * dt_s);
         match self.drive {
             Drive::Differential { wheelbase_m, .. } => {
                 let target = match command {
-                    Command::Twist { yaw_rate_radps, .. } => yaw_rate_radps,
-                    Command::Steer { speed_mps, steer_rad } => speed_mps * trig::tan(steer_rad) / wheelbase_m,
+                    WheelCommand::Twist { yaw_rate_radps, .. } => yaw_rate_radps,
+                    WheelCommand::Steer { speed_mps, steer_rad } => {
+                        speed_mps * trig::tan(steer_rad) / wheelbase_m
+                    }
                 };
                 let step = self.max_yaw_accel_radps2 * dt_s;
                 state.wheel_yaw_rate_radps = approach(state.wheel_yaw_rate_radps, target, step);
             }
             Drive::Ackermann { wheelbase_m, max_steer_rad, steer_rate_radps, .. } => {
                 let target = match command {
-                    Command::Steer { steer_rad, .. } => steer_rad,
-                    Command::Twist { speed_mps, yaw_rate_radps } => {
+                    WheelCommand::Steer { steer_rad, .. } => steer_rad,
+                    WheelCommand::Twist { speed_mps, yaw_rate_radps } => {
                         steer_for(speed_mps, yaw_rate_radps, wheelbase_m)
                     }
                 };
@@ -74,10 +76,10 @@ impl Wheels {
     }
 
     /// What friction does to the body within `dt_s`.
-    pub(crate) fn push(&self, state: &RobotState, dt_s: f64) -> Push {
+    pub(crate) fn push(&self, state: &RobotState, dt_s: f64) -> WheelPush {
         let (rolling, turn) = self.rolling(state);
-        // A quarter of the weight on each wheel, and a quarter of the slip cured by each: together
-        // they stop a straight slide within one step, whatever its length.
+        // Each wheel carries a quarter of the weight and corrects a quarter of the slip. Together they stop a
+        // straight slide within one step, however long it is.
         let limit = self.grip_mps2 * dt_s;
         let (slide, spin) = (state.velocity - rolling, state.yaw_rate_radps - turn.rate_radps);
         let mut velocity = Vector::zeros();
@@ -85,31 +87,31 @@ impl Wheels {
         for contact in &self.contacts {
             let lateral = state.yaw_rate_radps - turn.lateral_rate_radps;
             let slip = slide + Vector::new(-spin * contact.y, lateral * contact.x);
-            // Most contacts hold: no root, no division.
+            // Most contacts do not slip; they need no root and no division.
             let square = slip.norm_squared();
             let share = if square <= limit * limit { 0.25 } else { 0.25 * limit / square.sqrt() };
             let change = slip * -share;
             velocity += change;
             moment += contact.x * change.y - contact.y * change.x;
         }
-        Push { velocity, yaw_rate_radps: moment * self.mass_by_inertia_pm2 }
+        WheelPush { velocity, yaw_rate_radps: moment * self.mass_by_inertia_pm2 }
     }
 
     /// How the body would move if no wheel slipped: its velocity, and the turn that the wheels roll
     /// (`rate_radps`) and steer (`lateral_rate_radps`).
-    fn rolling(&self, state: &RobotState) -> (Vector, Turn) {
+    fn rolling(&self, state: &RobotState) -> (Vector, WheelTurn) {
         let speed = state.wheel_speed_mps;
         match self.drive {
             Drive::Differential { .. } => (
                 Vector::new(speed, 0.0),
-                Turn { rate_radps: state.wheel_yaw_rate_radps, lateral_rate_radps: 0.0 },
+                WheelTurn { rate_radps: state.wheel_yaw_rate_radps, lateral_rate_radps: 0.0 },
             ),
             Drive::Ackermann { wheelbase_m, .. } => {
                 let rate_radps = speed * trig::tan(state.steer_rad) / wheelbase_m;
                 // The rear axle does not move sideways; the reference point is half a wheelbase ahead.
                 (
                     Vector::new(speed, rate_radps * wheelbase_m / 2.0),
-                    Turn { rate_radps, lateral_rate_radps: rate_radps },
+                    WheelTurn { rate_radps, lateral_rate_radps: rate_radps },
                 )
             }
         }
@@ -118,10 +120,10 @@ impl Wheels {
 
 /// The turn of the body that wheels allow without slip.
 #[derive(Clone, Copy, Debug)]
-struct Turn {
+struct WheelTurn {
     /// From the difference of speed between left and right.
     rate_radps: f64,
-    /// From the angle between front and rear wheels: none if all are fixed.
+    /// From the angle between front and rear wheels: 0 if all are fixed.
     lateral_rate_radps: f64,
 }
 

@@ -5,8 +5,8 @@ use parry2d::math::{Pose as EnginePose, Vector as EngineVector};
 use parry2d::query::intersection_test;
 use parry2d::shape::{Cuboid, SharedShape};
 use rand::RngExt;
-use sharp_sim::{RobotModel, World};
-use sharp_space::{CollisionChecker, Footprint, OccupancyGrid, Pose, Seed, Stream};
+use sharp_sim::{ObstacleMap, RobotModel};
+use sharp_space::{CollisionChecker, Footprint, FootprintChecker, OccupancyGrid, Pose, Seed, Stream};
 
 #[path = "../benches/support/maps.rs"]
 mod maps;
@@ -27,13 +27,13 @@ fn random_pose(grid: &OccupancyGrid, stream: &mut Stream) -> Pose {
 fn short_cuts_miss_no_collision_among_200_000_poses() {
     let grid = large_map();
     for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let world = World::new(&grid, robot.footprint);
+        let checker = FootprintChecker::new(&grid, robot.footprint);
         let stream = &mut Seed(1).stream("poses", 0);
         let mut free = 0;
         for _ in 0..POSES {
             let pose = random_pose(&grid, stream);
-            let exact = world.checker().is_free_exact(pose);
-            assert_eq!(world.checker().is_free(pose), exact, "{} at {pose:?}", robot.name);
+            let exact = checker.is_free_exact(pose);
+            assert_eq!(checker.is_free(pose), exact, "{} at {pose:?}", robot.name);
             free += usize::from(exact);
         }
         assert!((POSES / 10..POSES * 9 / 10).contains(&free), "{}: {free} poses are free", robot.name);
@@ -45,15 +45,15 @@ fn the_engines_own_test_of_the_merged_walls_agrees() {
     let grid = large_map();
     let hair_m = 1e-4;
     for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let world = World::new(&grid, robot.footprint);
-        let walls = compound(&world);
+        let obstacles = ObstacleMap::new(&grid, robot.footprint);
+        let walls = compound(&obstacles);
         // The engine computes in single precision: between a hair less and a hair more either
         // answer is right.
         let [thin, thick] = [-hair_m, hair_m].map(|hair_m| outline(&robot.footprint, hair_m));
         let stream = &mut Seed(2).stream("poses", 0);
         for _ in 0..POSES {
             let pose = random_pose(&grid, stream);
-            let local = world.frame().origin.to_local(pose.position);
+            let local = obstacles.frame().origin.to_local(pose.position);
             let place = EngineVector::new(local.x as f32, local.y as f32);
             let engine_pose = EnginePose::new(place, pose.heading.radians() as f32);
             let touches = |outline: &Cuboid| {
@@ -61,7 +61,7 @@ fn the_engines_own_test_of_the_merged_walls_agrees() {
                     .expect("compounds and boxes are supported")
                     .intersecting
             };
-            if world.checker().is_free(pose) {
+            if obstacles.checker().is_free(pose) {
                 assert!(!touches(&thin), "{} at {pose:?} is called free", robot.name);
             } else {
                 assert!(touches(&thick), "{} at {pose:?} is called blocked", robot.name);
@@ -70,8 +70,8 @@ fn the_engines_own_test_of_the_merged_walls_agrees() {
     }
 }
 
-fn compound(world: &World) -> SharedShape {
-    let walls = world.walls().map(|wall| {
+fn compound(obstacles: &ObstacleMap) -> SharedShape {
+    let walls = obstacles.walls().map(|wall| {
         let center = EngineVector::new(wall.center.x as f32, wall.center.y as f32);
         let shape = SharedShape::cuboid(wall.half_extents.x as f32, wall.half_extents.y as f32);
         (EnginePose::new(center, 0.0), shape)

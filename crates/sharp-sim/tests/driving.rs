@@ -6,12 +6,10 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use sharp_sim::{
-    ActionSettings, AnySim, Command, KinematicSim, NoiseModel, PlanarSim, RobotModel, RobotState, Simulator,
-    SimulatorKind, Vehicle, World,
+    ActionSettings, AnySim, KinematicSim, NoiseModel, ObstacleMap, PlanarSim, RobotModel, RobotState,
+    Simulator, SimulatorKind, Vehicle, WheelCommand,
 };
-use sharp_space::{
-    CollisionChecker, GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Seed, Vector,
-};
+use sharp_space::{GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Seed, Vector};
 
 const DT_S: f64 = 1.0 / 60.0;
 const KINDS: [SimulatorKind; 2] = [SimulatorKind::Kinematic, SimulatorKind::Planar];
@@ -32,7 +30,7 @@ fn walls(blocked: impl Fn(f64, f64) -> bool) -> OccupancyGrid {
     OccupancyGrid::new(frame, cells).expect("a sound grid")
 }
 
-/// Boxes strewn over the square, none near its centre.
+/// Boxes at random places in the square, none near its centre.
 fn clutter() -> OccupancyGrid {
     let stream = &mut Seed(9).stream("clutter", 0);
     let boxes: Vec<Point> = (0..40)
@@ -45,7 +43,7 @@ fn clutter() -> OccupancyGrid {
 }
 
 fn simulator(kind: SimulatorKind, grid: &OccupancyGrid, robot: &RobotModel) -> AnySim {
-    AnySim::new(kind, Arc::new(World::new(grid, robot.footprint)), robot)
+    AnySim::new(kind, Arc::new(ObstacleMap::new(grid, robot.footprint)), robot)
 }
 
 fn vehicle(
@@ -59,7 +57,7 @@ fn vehicle(
 }
 
 /// Holds `command` for eight seconds and returns the mean (speed ahead, turn) of the last four.
-fn response(kind: SimulatorKind, robot: &RobotModel, command: Command, dt_s: f64) -> (f64, f64) {
+fn response(kind: SimulatorKind, robot: &RobotModel, command: WheelCommand, dt_s: f64) -> (f64, f64) {
     let mut sim = simulator(kind, &plain(), robot);
     sim.reset(RobotState::at_rest(Pose::new(-5.0, 0.0, 0.0)));
     let steps = (8.0 / dt_s).round() as usize;
@@ -89,7 +87,7 @@ fn the_husky_turns_in_place_at_its_skid_ratio() {
     let husky = RobotModel::husky();
     at_every_time_step(|kind, dt_s| {
         for yaw_rate_radps in [0.5, 1.0, -2.0] {
-            let command = Command::Twist { speed_mps: 0.0, yaw_rate_radps };
+            let command = WheelCommand::Twist { speed_mps: 0.0, yaw_rate_radps };
             let ratio = response(kind, &husky, command, dt_s).1 / yaw_rate_radps;
             assert!((ratio - 0.554).abs() < 0.01, "{kind} {dt_s} s: {ratio} at {yaw_rate_radps} rad/s");
         }
@@ -101,7 +99,7 @@ fn the_limo_turns_at_full_lock_on_forty_centimetres() {
     let limo = RobotModel::limo();
     at_every_time_step(|kind, dt_s| {
         for (speed_mps, steer_rad) in [(0.3, 1.0), (1.0, 1.0), (1.0, -1.0)] {
-            let (speed, turn) = response(kind, &limo, Command::Steer { speed_mps, steer_rad }, dt_s);
+            let (speed, turn) = response(kind, &limo, WheelCommand::Steer { speed_mps, steer_rad }, dt_s);
             let radius_m = speed / turn.abs();
             assert!((radius_m - 0.40).abs() < 0.02, "{kind} {dt_s} s: {radius_m} m at {speed_mps} m/s");
         }
@@ -112,7 +110,7 @@ fn the_limo_turns_at_full_lock_on_forty_centimetres() {
 fn straight_ahead_robots_reach_the_commanded_speed() {
     at_every_time_step(|kind, dt_s| {
         for robot in [RobotModel::husky(), RobotModel::limo()] {
-            let command = Command::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
+            let command = WheelCommand::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
             let (speed, turn) = response(kind, &robot, command, dt_s);
             assert!((speed - 1.0).abs() < 0.005, "{} {kind} {dt_s} s: {speed} m/s", robot.name);
             assert!(turn.abs() < 1e-6, "{} {kind} {dt_s} s: turns at {turn} rad/s", robot.name);
@@ -126,7 +124,7 @@ fn wheels_obey_the_acceleration_limit() {
         let mut sim = simulator(kind, &plain(), &RobotModel::husky());
         sim.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)));
         for _ in 0..12 {
-            sim.step(Command::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 }, DT_S);
+            sim.step(WheelCommand::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 }, DT_S);
         }
         let speed = sim.state().speed_mps();
         assert!((speed - 0.6).abs() < 0.01, "{kind}: {speed} m/s after 0.2 s at 3 m/s²");
@@ -142,7 +140,7 @@ fn the_simulators_agree_where_nothing_is_touched() {
         }
         let stream = &mut Seed(1).stream("commands", 0);
         for second in 0..10 {
-            let command = Command::Twist {
+            let command = WheelCommand::Twist {
                 speed_mps: stream.random_range(0.0..1.0),
                 yaw_rate_radps: stream.random_range(-1.5..1.5),
             };
@@ -176,7 +174,7 @@ fn a_turned_map_drives_like_a_straight_one() {
             let heading = Heading::new(frame.origin.heading.radians() + 0.3);
             sim.reset(RobotState::at_rest(Pose::at(frame.from_grid(Vector::new(40.0, 50.0)), heading)));
             for _ in 0..600 {
-                sim.step(Command::Twist { speed_mps: 0.8, yaw_rate_radps: 0.4 }, DT_S);
+                sim.step(WheelCommand::Twist { speed_mps: 0.8, yaw_rate_radps: 0.4 }, DT_S);
             }
             frame.to_grid(sim.state().pose.position)
         });
@@ -192,7 +190,7 @@ fn a_limo_that_grazes_a_wall_keeps_moving() {
     sim.reset(RobotState::rolling(Pose::new(-2.0, -0.15, 0.1), 0.7));
     let mut touched = false;
     for _ in 0..180 {
-        touched |= sim.step(Command::Steer { speed_mps: 0.7, steer_rad: 0.05 }, DT_S).in_contact;
+        touched |= sim.step(WheelCommand::Steer { speed_mps: 0.7, steer_rad: 0.05 }, DT_S).in_contact;
     }
     let way_m = sim.state().pose.position.x + 2.0;
     assert!(touched, "it leans on the wall");
@@ -207,7 +205,7 @@ fn a_robot_pushes_a_wall_and_backs_out() {
             let mut sim = simulator(kind, &grid, &robot);
             sim.reset(RobotState::at_rest(Pose::new(-0.5, 0.03, 0.0)));
             let drive = |sim: &mut AnySim, speed_mps: f64, seconds: usize| {
-                let command = Command::Twist { speed_mps, yaw_rate_radps: 0.0 };
+                let command = WheelCommand::Twist { speed_mps, yaw_rate_radps: 0.0 };
                 (0..seconds * 60).map(|_| sim.step(command, DT_S).in_contact).last() == Some(true)
             };
             let name = format!("{} {kind}", robot.name);
@@ -226,25 +224,25 @@ fn random_driving_stays_inside_and_out_of_walls() {
     let grid = clutter();
     for kind in KINDS {
         for robot in [RobotModel::husky(), RobotModel::limo()] {
-            let world = World::new(&grid, robot.footprint);
+            let obstacles = ObstacleMap::new(&grid, robot.footprint);
             let shrunk = sharp_space::Footprint::rectangle(
                 robot.footprint.half_length_m() - 0.04,
                 robot.footprint.half_width_m() - 0.04,
             );
-            let inner = World::new(&grid, shrunk.expect("both robots are wider than 8 cm"));
+            let inner = ObstacleMap::new(&grid, shrunk.expect("both robots are wider than 8 cm"));
             let mut sim = simulator(kind, &grid, &robot);
             sim.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)));
             let stream = &mut Seed(2).stream("commands", 0);
             let mut contacts = 0;
             for _ in 0..600 {
-                let command = Command::Twist {
+                let command = WheelCommand::Twist {
                     speed_mps: stream.random_range(-0.5..1.0),
                     yaw_rate_radps: stream.random_range(-2.0..2.0),
                 };
                 for _ in 0..20 {
                     contacts += usize::from(sim.step(command, DT_S).in_contact);
                     let pose = sim.state().pose;
-                    let checker = if kind == SimulatorKind::Kinematic { &world } else { &inner };
+                    let checker = if kind == SimulatorKind::Kinematic { &obstacles } else { &inner };
                     assert!(
                         checker.checker().is_free(pose),
                         "{} {kind} is inside a wall: {pose:?}",
@@ -404,7 +402,7 @@ fn episode(vehicle: &mut Vehicle<AnySim>, actions: u64) -> Vec<RobotState> {
     (0..actions)
         .map(|i| {
             let bearing = i as f64 * 2.4;
-            let offset = Vector::new(bearing.cos(), bearing.sin()) * 0.5 + Vector::new(0.4, 0.0);
+            let offset = Heading::new(bearing).unit() * 0.5 + Vector::new(0.4, 0.0);
             let waypoint = vehicle.state().pose.position + offset;
             vehicle.act(waypoint).after
         })
@@ -495,7 +493,7 @@ fn concrete_simulators_fit_the_vehicle_too() {
         vehicle.act(Point::new(0.5, 0.0)).path_m > 0.05
     }
     let limo = RobotModel::limo();
-    let world = Arc::new(World::new(&plain(), limo.footprint));
-    assert!(moves(KinematicSim::new(world.clone(), &limo)), "kinematic");
-    assert!(moves(PlanarSim::new(world, &limo)), "planar");
+    let obstacles = Arc::new(ObstacleMap::new(&plain(), limo.footprint));
+    assert!(moves(KinematicSim::new(obstacles.clone(), &limo)), "kinematic");
+    assert!(moves(PlanarSim::new(obstacles, &limo)), "planar");
 }

@@ -6,32 +6,32 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use sharp_sim::{
-    ActionSettings, Command, NoiseModel, PlanarSim, RigidSim, RobotModel, RobotState, Simulator, Vehicle,
-    World,
+    ActionSettings, NoiseModel, ObstacleMap, PlanarSim, RigidSim, RobotModel, RobotState, Simulator, Vehicle,
+    WheelCommand,
 };
 use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Point, Pose, Seed};
 
 const DT_S: f64 = 1.0 / 60.0;
 
 /// A square of 20 m around the world's origin, blocked where `blocked` says so.
-fn world(robot: &RobotModel, blocked: impl Fn(f64, f64) -> bool) -> Arc<World> {
+fn obstacles(robot: &RobotModel, blocked: impl Fn(f64, f64) -> bool) -> Arc<ObstacleMap> {
     let frame =
         GridFrame { origin: Pose::new(-10.0, -10.0, 0.0), resolution_m: 0.1, width: 200, height: 200 };
     let cells = (0..frame.len())
         .map(|index| frame.center(frame.cell(index)))
         .map(|c| if blocked(c.x, c.y) { Occupancy::Occupied } else { Occupancy::Free })
         .collect();
-    Arc::new(World::new(&OccupancyGrid::new(frame, cells).expect("a sound grid"), robot.footprint))
+    Arc::new(ObstacleMap::new(&OccupancyGrid::new(frame, cells).expect("a sound grid"), robot.footprint))
 }
 
 fn on_the_plain(robot: &RobotModel) -> RigidSim {
-    let mut sim = RigidSim::new(world(robot, |_, _| false), robot);
+    let mut sim = RigidSim::new(obstacles(robot, |_, _| false), robot);
     sim.reset(RobotState::at_rest(Pose::new(-5.0, 0.0, 0.0)));
     sim
 }
 
 /// Holds `command` for six seconds and returns the mean (speed ahead, turn) of the last three.
-fn response(robot: &RobotModel, command: Command, dt_s: f64) -> (f64, f64) {
+fn response(robot: &RobotModel, command: WheelCommand, dt_s: f64) -> (f64, f64) {
     let mut sim = on_the_plain(robot);
     let steps = (6.0 / dt_s).round() as usize;
     let (mut speed, mut turn) = (0.0, 0.0);
@@ -50,7 +50,7 @@ fn wheels_that_skid_turn_the_husky_at_its_ratio() {
     let husky = RobotModel::husky();
     for hz in [60.0, 240.0] {
         for yaw_rate_radps in [0.5, -2.0] {
-            let command = Command::Twist { speed_mps: 0.0, yaw_rate_radps };
+            let command = WheelCommand::Twist { speed_mps: 0.0, yaw_rate_radps };
             let ratio = response(&husky, command, 1.0 / hz).1 / yaw_rate_radps;
             assert!((ratio - husky.yaw_gain()).abs() < 0.02, "{ratio} at {hz} Hz, {yaw_rate_radps} rad/s");
         }
@@ -62,7 +62,7 @@ fn wheels_that_steer_turn_the_limo_on_forty_centimetres() {
     let limo = RobotModel::limo();
     for hz in [60.0, 240.0] {
         for (speed_mps, steer_rad) in [(0.3, 1.0), (1.0, -1.0)] {
-            let (speed, turn) = response(&limo, Command::Steer { speed_mps, steer_rad }, 1.0 / hz);
+            let (speed, turn) = response(&limo, WheelCommand::Steer { speed_mps, steer_rad }, 1.0 / hz);
             let radius_m = speed / turn.abs();
             assert!((radius_m - 0.40).abs() < 0.03, "{radius_m} m at {hz} Hz, {speed_mps} m/s");
         }
@@ -71,7 +71,7 @@ fn wheels_that_steer_turn_the_limo_on_forty_centimetres() {
 
 #[test]
 fn straight_ahead_robots_reach_the_commanded_speed() {
-    let command = Command::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
+    let command = WheelCommand::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
     // The engine's balls roll short in proportion to the time step, small ones more than large ones:
     // the Limo's by 1.5 % at 60 Hz.
     for (hz, tolerance) in [(60.0, 0.02), (240.0, 0.005)] {
@@ -86,7 +86,7 @@ fn straight_ahead_robots_reach_the_commanded_speed() {
 #[test]
 fn it_stays_near_the_planar_simulator() {
     for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let plain = world(&robot, |_, _| false);
+        let plain = obstacles(&robot, |_, _| false);
         let mut rigid = RigidSim::new(plain.clone(), &robot);
         let mut planar = PlanarSim::new(plain, &robot);
         let start = RobotState::rolling(Pose::new(1.0, 2.0, 0.5), 0.3);
@@ -94,7 +94,7 @@ fn it_stays_near_the_planar_simulator() {
         planar.reset(start);
         let stream = &mut Seed(1).stream("commands", 0);
         for _ in 0..5 {
-            let command = Command::Twist {
+            let command = WheelCommand::Twist {
                 speed_mps: stream.random_range(0.2..1.0),
                 yaw_rate_radps: stream.random_range(-1.5..1.5),
             };
@@ -111,10 +111,10 @@ fn it_stays_near_the_planar_simulator() {
 #[test]
 fn a_robot_pushes_a_wall_without_climbing_it_and_backs_out() {
     for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let mut sim = RigidSim::new(world(&robot, |x, _| x > 1.0), &robot);
+        let mut sim = RigidSim::new(obstacles(&robot, |x, _| x > 1.0), &robot);
         sim.reset(RobotState::at_rest(Pose::new(-0.5, 0.03, 0.0)));
         let drive = |sim: &mut RigidSim, speed_mps: f64, seconds: usize| {
-            let command = Command::Twist { speed_mps, yaw_rate_radps: 0.0 };
+            let command = WheelCommand::Twist { speed_mps, yaw_rate_radps: 0.0 };
             (0..seconds * 60).map(|_| sim.step(command, DT_S).in_contact).last() == Some(true)
         };
         let name = &robot.name;
@@ -129,8 +129,9 @@ fn a_robot_pushes_a_wall_without_climbing_it_and_backs_out() {
 #[test]
 fn equal_seeds_and_forks_give_equal_bits() {
     for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let clutter =
-            world(&robot, |x, y| (x.rem_euclid(2.5) < 0.4 && y.rem_euclid(2.5) < 0.4) && x.hypot(y) > 1.0);
+        let clutter = obstacles(&robot, |x, y| {
+            (x.rem_euclid(2.5) < 0.4 && y.rem_euclid(2.5) < 0.4) && x.hypot(y) > 1.0
+        });
         let sim = RigidSim::new(clutter, &robot);
         let settings = ActionSettings { stop_at_contact: false, ..ActionSettings::default() };
         let mut vehicle = Vehicle::new(sim, Arc::new(robot.clone()), NoiseModel::harsh(), settings);

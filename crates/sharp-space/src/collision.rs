@@ -1,4 +1,4 @@
-//! The collision function f : X → {0, 1} of the paper, turned around: where the robot may stand.
+//! The collision function f : X → {0, 1} of the paper. Here true means free.
 
 use std::sync::Arc;
 
@@ -7,15 +7,17 @@ use crate::footprint::Footprint;
 use crate::grid::{GridFrame, OccupancyGrid};
 use crate::pose::Pose;
 
-/// Decides where the robot may stand. Implement [`is_free`](Self::is_free); the rest follows.
+/// Decides which poses are free of collision. Implement [`is_free`](Self::is_free); the test of segments is
+/// provided. [`conformance::check_collision_checker`](crate::conformance::check_collision_checker) tests an
+/// implementation.
 pub trait CollisionChecker {
     /// Returns true if the footprint at `pose` lies inside the map and touches no blocked cell.
     fn is_free(&self, pose: Pose) -> bool;
 
     /// Returns true if poses at most `step_m` metres apart from `from` to `to` are free, ends included.
     ///
-    /// Headings turn the short way in step with the position; a turn in place is sampled as if the
-    /// outline were a metre away, so that no corner moves more than `step_m` per metre of reach.
+    /// Headings turn the short way in step with the position. A turn in place is sampled every `step_m`
+    /// radians, so that a corner a metre away moves by `step_m`.
     fn is_segment_free(&self, from: Pose, to: Pose, step_m: f64) -> bool {
         let length = from.distance_m(&to).max(from.heading.turn_to(to.heading).abs());
         let steps = (length / step_m).ceil().max(1.0) as usize;
@@ -41,9 +43,9 @@ forward!(&C, Box<C>, Arc<C>);
 
 /// Exact test of a rectangle against the blocked cells of a grid.
 ///
-/// A distance field settles the clear cases; between the inscribed and the circumscribed radius
-/// the rectangle is cut into grid rows, and a running count of blocked cells answers each row at
-/// once. A rectangle that only touches a cell's side counts as free.
+/// A distance field decides the clear cases. Between the inscribed and the circumscribed radius, the
+/// rectangle is cut into grid rows, and prefix counts of blocked cells answer each row in constant time. A
+/// rectangle that only touches a cell's side counts as free.
 #[derive(Clone, Debug)]
 pub struct FootprintChecker {
     footprint: Footprint,
@@ -70,7 +72,7 @@ impl FootprintChecker {
         Self { footprint, field, blocked_before: blocked_before.into() }
     }
 
-    /// A checker for another outline in the same map; the two share what they know of it.
+    /// A checker for another outline in the same map. Both share the distance field and the counts.
     #[must_use]
     pub fn with_footprint(&self, footprint: Footprint) -> Self {
         Self { footprint, field: Arc::clone(&self.field), blocked_before: Arc::clone(&self.blocked_before) }
@@ -181,7 +183,7 @@ mod tests {
         let door = |heading| checker.is_free(Pose::new(2.25, 1.25, heading));
         assert!(door(std::f64::consts::FRAC_PI_2), "straight through");
         assert!(!door(0.0), "sideways");
-        assert!(!door(1.1), "askew");
+        assert!(!door(1.1), "at an angle");
     }
 
     #[test]

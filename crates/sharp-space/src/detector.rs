@@ -1,7 +1,7 @@
 //! Where critical regions come from: the trait behind a network, a geometric rule or a list.
 //!
-//! Line 2 of Algorithm 1 predicts the critical regions Φ of an environment. Everything above takes them as
-//! data, so any predictor will do that implements [`RegionDetector`].
+//! Line 5 of Algorithm 1 predicts the critical regions Φ of an environment. Everything above takes them as
+//! data, so they may come from any [`RegionDetector`].
 
 use std::sync::Arc;
 
@@ -11,9 +11,8 @@ use crate::region::Region;
 
 /// Finds the critical regions Φ of a map for a robot. Implement [`detect`](Self::detect).
 ///
-/// A critical region is a connected set of free cells that many solutions pass and few uniform samples hit
-/// (Definition 1). [`conformance::check_region_detector`](crate::conformance::check_region_detector) tests an
-/// implementation.
+/// A critical region is a connected set of free cells that many solutions pass and few uniform samples hit.
+/// [`conformance::check_region_detector`](crate::conformance::check_region_detector) tests an implementation.
 pub trait RegionDetector: Send + Sync {
     /// The critical regions of `grid` for a robot with the outline `footprint`.
     ///

@@ -1,8 +1,8 @@
 //! Exact Euclidean distance transform of an occupancy grid.
 //!
-//! Two passes of lower envelopes of parabolas (Felzenszwalb and Huttenlocher, "Distance Transforms
-//! of Sampled Functions", 2012): linear in the number of cells, exact between cell centres. Every
-//! cell outside the grid counts as blocked: a robot may not leave the map.
+//! Two passes of lower envelopes of parabolas (Felzenszwalb and Huttenlocher, "Distance Transforms of Sampled
+//! Functions", 2012): linear in the number of cells, exact between cell centres. Every cell outside the grid
+//! counts as blocked, because a robot may not leave the map.
 
 use crate::grid::{Cell, GridFrame, OccupancyGrid};
 use crate::pose::Point;
@@ -41,7 +41,7 @@ impl DistanceField {
                 *cell = cell.min(run);
             }
         }
-        let mut line = Envelope::new(width + 2);
+        let mut line = LowerEnvelope::new(width + 2);
         for row in squared.chunks_exact_mut(width) {
             line.transform_row(row);
         }
@@ -88,8 +88,8 @@ impl DistanceField {
 
     /// A lower bound of the distance from `point` to the nearest blocked *area*, metres.
     ///
-    /// Centre-to-centre distances overestimate by up to half a diagonal at either end, so both
-    /// halves are taken off; 0 outside the grid.
+    /// Centre-to-centre distances overestimate by up to half a diagonal at either end, so both halves are
+    /// subtracted. The bound is 0 outside the grid.
     #[must_use]
     pub fn clearance_lower_bound(&self, point: Point) -> f64 {
         self.frame
@@ -99,13 +99,13 @@ impl DistanceField {
 }
 
 /// Lower envelope of parabolas over one row with a blocked cell at either side.
-struct Envelope {
+struct LowerEnvelope {
     heights: Vec<f32>,
     vertices: Vec<usize>,
     bounds: Vec<f32>,
 }
 
-impl Envelope {
+impl LowerEnvelope {
     fn new(len: usize) -> Self {
         Self { heights: vec![0.0; len], vertices: vec![0; len], bounds: vec![0.0; len + 1] }
     }
@@ -186,10 +186,10 @@ mod tests {
     }
 
     #[test]
-    fn outside_the_grid_there_is_no_room() {
+    fn outside_the_grid_the_clearance_is_zero() {
         let frame = GridFrame { origin: Pose::new(0.0, 0.0, 0.0), resolution_m: 1.0, width: 5, height: 5 };
         let field = DistanceField::from_mask(frame, |_| false);
         assert_eq!(field.sample(Point::new(-0.1, 2.0)), 0.0, "left of the map");
-        assert_eq!(field.at(Cell::new(2, 2)), 3.0, "the centre sees the border");
+        assert_eq!(field.at(Cell::new(2, 2)), 3.0, "the nearest blocked cell lies outside the border");
     }
 }

@@ -15,7 +15,7 @@ pub struct FootprintError {
     pub value: f64,
 }
 
-/// A rectangle around the robot's reference point, long side ahead.
+/// A rectangle around the robot's reference point. Its length lies along the heading.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Footprint {
     half_length_m: f64,

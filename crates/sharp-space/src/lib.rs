@@ -1,9 +1,10 @@
-//! What is true of the configuration space before anything moves.
+//! The configuration space of a robot on a floor.
 //!
-//! The nouns that every other crate shares: a [`Pose`] in SE(2), an [`OccupancyGrid`] and its
-//! [`DistanceField`], a robot's [`Footprint`], the collision function as the trait
-//! [`CollisionChecker`], a critical [`Region`], and the named random streams of a [`Seed`].
-//! Nothing here knows dynamics, learning or files.
+//! The types that every other crate shares: a [`Pose`] in SE(2), an [`OccupancyGrid`] and its
+//! [`DistanceField`], a robot's [`Footprint`], a critical [`Region`], and the named random streams of a
+//! [`Seed`]. Three traits let others bring their own parts: [`CollisionChecker`] and [`RobotGeometry`] decide
+//! where a robot fits, a [`RegionDetector`] finds critical regions. Nothing here knows dynamics, learning or
+//! files.
 //!
 //! ```
 //! use sharp_space::{CollisionChecker, Footprint, FootprintChecker, OccupancyGrid, Pose};
@@ -27,7 +28,6 @@ mod region;
 mod seed;
 
 pub mod conformance;
-pub mod floorplan;
 pub mod trig;
 
 pub use bounds::Bounds;

@@ -1,4 +1,4 @@
-//! Critical regions φ ∈ Φ: produced by a predictor or drawn by hand, used by everything above.
+//! Critical regions φ ∈ Φ, from a detector or a list.
 
 use serde::{Deserialize, Serialize};
 

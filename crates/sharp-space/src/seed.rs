@@ -1,7 +1,7 @@
 //! Named random streams: the only source of randomness in the project.
 //!
-//! A stream is keyed by (seed, name, index), so neither the order in which streams are asked for
-//! nor the number of threads can change what is drawn.
+//! A stream is keyed by (seed, name, index), so neither the order in which streams are made nor the number of
+//! threads changes what is drawn.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -36,7 +36,7 @@ impl Seed {
     }
 }
 
-/// The 64-bit FNV-1a hash: short, stable, good enough to keep names apart.
+/// The 64-bit FNV-1a hash: short, stable, and different for different names in practice.
 fn fnv1a(bytes: &[u8]) -> u64 {
     bytes
         .iter()

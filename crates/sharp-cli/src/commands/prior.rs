@@ -9,12 +9,12 @@ use std::time::Instant;
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
+use sharp_maps::{FloorplanKind, generate};
 use sharp_options::{OptionKind, OptionSet};
 use sharp_plan::prior::{self, Course, CourseTask};
 use sharp_plan::{Abstraction, Follower, OptionPolicy, PacedFollower, Prior, Query, Workspace, write_atomic};
 use sharp_rl::{Progress, TrainSettings, TrainState, Trained, fine_tune, resume, train};
 use sharp_sim::{NoiseModel, RobotModel};
-use sharp_space::floorplan::{FloorplanKind, generate};
 use sharp_space::{GridFrame, OccupancyGrid, Pose, Seed, Stream};
 
 use crate::args::{PriorCommand, PriorScore, PriorTrain};

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde::Serialize;
+use sharp_maps::FloorplanKind;
 use sharp_maps::load_doors;
 use sharp_plan::Workspace;
 use sharp_regions::{
@@ -11,7 +12,6 @@ use sharp_regions::{
     grid_regions, predict_regions, random_regions, score_doors, score_regions, scoring_maps,
 };
 use sharp_sim::RobotModel;
-use sharp_space::floorplan::FloorplanKind;
 use sharp_space::{DistanceField, OccupancyGrid, Point, Region, Seed};
 
 use crate::args::{MapArgs, RegionsScore, Unknown};

@@ -6,12 +6,12 @@ use std::time::Instant;
 
 use indicatif::ProgressBar;
 use serde::Serialize;
+use sharp_maps::generate;
 use sharp_plan::write_atomic;
 use sharp_regions::{
     ComputeDevice, LabelRobot, RegionPredictor, RegionSettings, RegionTrainError, RegionTrainSettings,
     TrainFolder, TrainProgress, VALIDATION_KINDS, predict_regions, train_regions,
 };
-use sharp_space::floorplan::generate;
 use sharp_space::{OccupancyGrid, Seed};
 
 use crate::args::RegionsTrain;

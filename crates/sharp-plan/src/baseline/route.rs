@@ -66,7 +66,7 @@ fn ridge(spare: &Spare, query: &Query) -> Option<GuidePath> {
 /// By hybrid A*.
 fn searched(spare: &Spare, query: &Query, goal_radius_m: f64) -> Option<GuidePath> {
     let settings = HybridSettings { goal_radius_m, ..HybridSettings::default() };
-    let query = sharp_motion::Query { start: query.start, goal: query.goal };
+    let query = sharp_motion::MotionQuery { start: query.start, goal: query.goal };
     let path = hybrid_astar(&query, &spare.checker, &spare.steering, &settings).path()?;
     as_guide(&path, &spare.steering)
 }

@@ -115,12 +115,12 @@ impl Pilot for RrtPilot<'_> {
 impl RrtPilot<'_> {
     fn plan(&mut self, start: Pose) -> Readiness {
         let Rrt { workspace, planner, query, settings, .. } = self.baseline;
-        let query = sharp_motion::Query { start, goal: query.goal };
+        let query = sharp_motion::MotionQuery { start, goal: query.goal };
         let mut sampler = Uniform { bounds: workspace.grid.frame().bounds() };
         let mut rng = self.seed.stream("plan", self.plans);
         self.plans += 1;
         let path = planner.attempts(start).find_map(|Spare { checker, steering }| {
-            let query = sharp_motion::Query { goal: fitting(checker, query.goal)?, ..query };
+            let query = sharp_motion::MotionQuery { goal: fitting(checker, query.goal)?, ..query };
             let path = rrt(&query, checker, steering, &mut sampler, settings, &mut rng).path()?;
             Some(shortcut(&path, checker, steering, &ShortcutSettings::default(), &mut rng))
         });

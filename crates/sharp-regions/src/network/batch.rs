@@ -2,8 +2,8 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt;
+use sharp_maps::turned_from;
 use sharp_space::Stream;
-use sharp_space::floorplan::turned_from;
 
 use crate::heatmap::HEADING_BINS;
 use crate::labels::{CRITICAL_MIN, FINE_BINS};

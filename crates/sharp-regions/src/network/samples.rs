@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
-use sharp_space::floorplan::FloorplanKind;
+use sharp_maps::FloorplanKind;
 use sharp_space::{DistanceField, GridFrame, Pose};
 use thiserror::Error;
 

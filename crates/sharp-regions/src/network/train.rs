@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use burn::module::Module;
 use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer, OptimizerRecord};
 use burn::tensor::{Bytes, Device};
-use sharp_space::floorplan::FloorplanKind;
+use sharp_maps::FloorplanKind;
 use thiserror::Error;
 
 use crate::labels::LabelRobot;

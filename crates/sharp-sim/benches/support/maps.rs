@@ -2,7 +2,7 @@
 //! world's origin in the middle, seven metres around it clear but for a slab to push against.
 
 use rand::RngExt;
-use sharp_space::floorplan::{FloorplanKind, generate};
+use sharp_maps::{FloorplanKind, generate};
 use sharp_space::{Cell, GridFrame, Occupancy, OccupancyGrid, Pose, Seed};
 
 /// Half the side of the clear square, metres.
@@ -27,7 +27,7 @@ pub(crate) fn map(name: &str) -> Option<OccupancyGrid> {
     })
 }
 
-/// Boxes of 0.2 to 0.5 m, none beside another: merging cells gives back just these.
+/// Boxes of 0.2 to 0.5 m, none beside another, so that merging cells gives exactly these.
 fn boxes(side_m: f64, count: usize) -> OccupancyGrid {
     let frame = frame((side_m / RESOLUTION_M).round() as usize);
     let mut cells = vec![Occupancy::Free; frame.len()];

@@ -12,17 +12,17 @@ use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_saphyr::options::{DuplicateKeyPolicy, MergeKeyPolicy, NonFiniteFloatPolicy};
 use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Pose};
 
-use crate::error::MapError;
-use crate::files::{self, Kind};
-use crate::load::LoadOptions;
-use crate::picture::{self, Picture};
+use super::error::MapError;
+use super::files::{self, FileKind};
+use super::load::LoadOptions;
+use super::picture::{self, GreyImage};
 
 /// What the map saver writes and plain images are read with.
 pub(crate) const OCCUPIED_THRESHOLD: f64 = 0.65;
 /// Just below 1 - 205/255, so that the grey 205 stays unknown.
 pub(crate) const FREE_THRESHOLD: f64 = 0.196;
 
-/// Beyond this many metres a double no longer tells micrometres apart.
+/// Beyond this, a double is too coarse for micrometres, metres.
 const ORIGIN_MAX_M: f64 = 1e9;
 
 /// The value of an occupancy message for a cell that was never observed.
@@ -30,7 +30,7 @@ const UNKNOWN: i8 = -1;
 
 /// How grey values become occupancy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mode {
+enum GreyMode {
     Trinary,
     Scale,
     Raw,
@@ -38,17 +38,17 @@ enum Mode {
 
 /// The rules by which an image becomes a grid.
 #[derive(Clone, Copy, Debug)]
-struct Rules {
-    mode: Mode,
+struct GreyRules {
+    mode: GreyMode,
     negate: bool,
     occupied_threshold: f64,
     free_threshold: f64,
 }
 
-impl Rules {
+impl GreyRules {
     /// The value 0..=100 or −1 that Nav2 publishes for a grey value.
     fn value_of(&self, grey: u8) -> i8 {
-        if self.mode == Mode::Raw {
+        if self.mode == GreyMode::Raw {
             return if grey <= 100 { grey as i8 } else { UNKNOWN };
         }
         // Single precision, as in Nav2: the comparison at a threshold depends on it.
@@ -60,7 +60,7 @@ impl Rules {
             0
         } else if share >= occupied {
             100
-        } else if self.mode == Mode::Scale {
+        } else if self.mode == GreyMode::Scale {
             ((share - free) / (occupied - free) * 100.0).round() as i8
         } else {
             UNKNOWN
@@ -79,11 +79,11 @@ impl Rules {
 
 /// Everything that the YAML says.
 #[derive(Clone, Debug)]
-struct Description {
+struct RosDescription {
     image: String,
     resolution_m: f64,
     origin: Pose,
-    rules: Rules,
+    rules: GreyRules,
 }
 
 /// Reads the map described by the YAML file at `path`.
@@ -93,9 +93,9 @@ pub(crate) fn load(
     warnings: &mut Vec<String>,
 ) -> Result<OccupancyGrid, MapError> {
     let file = path.display().to_string();
-    let bytes = files::read(path, Kind::Text)?;
+    let bytes = files::read(path, FileKind::Text)?;
     let description = describe(&file, files::as_text(&file, &bytes)?)?;
-    let Rules { occupied_threshold, free_threshold, .. } = description.rules;
+    let GreyRules { occupied_threshold, free_threshold, .. } = description.rules;
     if free_threshold > occupied_threshold {
         warnings.push(format!(
             "{file}: free_thresh {free_threshold} is above occupied_thresh {occupied_threshold}, \
@@ -104,7 +104,7 @@ pub(crate) fn load(
     }
     let image = find_image(path, &file, &description.image, options)?;
     let image_file = image.display().to_string();
-    let picture = files::read(&image, Kind::Cells).and_then(|bytes| picture::decode(&image_file, &bytes));
+    let picture = files::read(&image, FileKind::Cells).and_then(|bytes| picture::decode(&image_file, &bytes));
     let picture = picture.map_err(|source| in_image(&file, &description.image, source))?;
     to_grid(&file, &picture, &description)
 }
@@ -112,24 +112,24 @@ pub(crate) fn load(
 /// An image without a description: white is free, black is occupied, the grey 205 is unknown.
 pub(crate) fn plain_grid(
     file: &str,
-    picture: &Picture,
+    picture: &GreyImage,
     resolution_m: f64,
 ) -> Result<OccupancyGrid, MapError> {
-    let rules = Rules {
-        mode: Mode::Trinary,
+    let rules = GreyRules {
+        mode: GreyMode::Trinary,
         negate: false,
         occupied_threshold: OCCUPIED_THRESHOLD,
         free_threshold: FREE_THRESHOLD,
     };
     let origin = Pose::new(0.0, 0.0, 0.0);
-    to_grid(file, picture, &Description { image: String::new(), resolution_m, origin, rules })
+    to_grid(file, picture, &RosDescription { image: String::new(), resolution_m, origin, rules })
 }
 
-fn to_grid(file: &str, picture: &Picture, description: &Description) -> Result<OccupancyGrid, MapError> {
-    let Picture { width, height, grey, transparent } = picture;
+fn to_grid(file: &str, picture: &GreyImage, description: &RosDescription) -> Result<OccupancyGrid, MapError> {
+    let GreyImage { width, height, grey, transparent } = picture;
     let table: Vec<Occupancy> = (0..=255).map(|grey| description.rules.occupancy_of(grey)).collect();
     // Raw images state values, not looks: transparency means nothing there.
-    let transparent = transparent.as_ref().filter(|_| description.rules.mode != Mode::Raw);
+    let transparent = transparent.as_ref().filter(|_| description.rules.mode != GreyMode::Raw);
     let mut cells = Vec::with_capacity(grey.len());
     for row in (0..*height).rev() {
         let row = row * width..(row + 1) * width;
@@ -174,8 +174,8 @@ fn in_image(file: &str, image: &str, source: MapError) -> MapError {
     MapError::InImage { file: file.to_owned(), image: image.to_owned(), source: Box::new(source) }
 }
 
-fn describe(file: &str, text: &str) -> Result<Description, MapError> {
-    let fields = Fields { file, entries: parse_yaml(file, text)? };
+fn describe(file: &str, text: &str) -> Result<RosDescription, MapError> {
+    let fields = YamlFields { file, entries: parse_yaml(file, text)? };
     let image = fields.text("image", "the path of an image file")?;
     if image.is_empty() || image.contains('\0') {
         return Err(MapError::field(file, "image", format!("{image:?}"), "the path of an image file"));
@@ -184,42 +184,44 @@ fn describe(file: &str, text: &str) -> Result<Description, MapError> {
     if !(1e-6..=1000.0).contains(&resolution_m) {
         return Err(MapError::field(file, "resolution", resolution_m, "metres a pixel, from 1e-6 to 1000"));
     }
-    let rules = Rules {
+    let rules = GreyRules {
         mode: fields.mode()?,
         negate: fields.negate()?,
         occupied_threshold: fields.threshold("occupied_thresh")?,
         free_threshold: fields.threshold("free_thresh")?,
     };
-    Ok(Description { image, resolution_m, origin: fields.origin()?, rules })
+    Ok(RosDescription { image, resolution_m, origin: fields.origin()?, rules })
 }
 
-/// The entries of the YAML with what is needed to complain about them.
-struct Fields<'a> {
+/// The entries of the YAML and the file's name for messages.
+struct YamlFields<'a> {
     file: &'a str,
-    entries: Vec<(String, Node)>,
+    entries: Vec<(String, YamlValue)>,
 }
 
-impl Fields<'_> {
-    fn find(&self, key: &str) -> Option<&Node> {
+impl YamlFields<'_> {
+    fn find(&self, key: &str) -> Option<&YamlValue> {
         self.entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
     }
 
     fn error(&self, key: &str, expected: &str) -> MapError {
-        let value = self.find(key).map_or_else(|| "missing".to_owned(), Node::describe);
+        let value = self.find(key).map_or_else(|| "missing".to_owned(), YamlValue::describe);
         MapError::field(self.file, key, value, expected)
     }
 
     fn text(&self, key: &str, expected: &str) -> Result<String, MapError> {
         match self.find(key) {
-            Some(Node::Text(text)) => Ok(text.clone()),
+            Some(YamlValue::Text(text)) => Ok(text.clone()),
             // An image may be called `1`.
-            Some(node @ (Node::Int(_) | Node::Float(_) | Node::Bool(_))) => Ok(node.describe()),
+            Some(node @ (YamlValue::Int(_) | YamlValue::Float(_) | YamlValue::Bool(_))) => {
+                Ok(node.describe())
+            }
             _ => Err(self.error(key, expected)),
         }
     }
 
     fn number(&self, key: &str, expected: &str) -> Result<f64, MapError> {
-        self.find(key).and_then(Node::number).ok_or_else(|| self.error(key, expected))
+        self.find(key).and_then(YamlValue::number).ok_or_else(|| self.error(key, expected))
     }
 
     fn threshold(&self, key: &str) -> Result<f64, MapError> {
@@ -230,8 +232,8 @@ impl Fields<'_> {
 
     fn origin(&self) -> Result<Pose, MapError> {
         let error = || self.error("origin", "three finite numbers [x, y, yaw], metres and radians");
-        let Some(Node::List(list)) = self.find("origin") else { return Err(error()) };
-        let numbers: Vec<f64> = list.iter().filter_map(Node::number).collect();
+        let Some(YamlValue::List(list)) = self.find("origin") else { return Err(error()) };
+        let numbers: Vec<f64> = list.iter().filter_map(YamlValue::number).collect();
         match numbers[..] {
             [x, y, yaw] if list.len() == 3 && [x, y, yaw].iter().all(|n| n.abs() <= ORIGIN_MAX_M) => {
                 Ok(Pose::new(x, y, yaw))
@@ -242,9 +244,9 @@ impl Fields<'_> {
 
     fn negate(&self) -> Result<bool, MapError> {
         let negate = match self.find("negate") {
-            Some(Node::Int(number)) => Some(*number != 0),
-            Some(Node::Bool(value)) => Some(*value),
-            Some(Node::Text(text)) => match text.to_ascii_lowercase().as_str() {
+            Some(YamlValue::Int(number)) => Some(*number != 0),
+            Some(YamlValue::Bool(value)) => Some(*value),
+            Some(YamlValue::Text(text)) => match text.to_ascii_lowercase().as_str() {
                 "0" | "false" | "no" | "off" | "n" => Some(false),
                 "1" | "true" | "yes" | "on" | "y" => Some(true),
                 _ => None,
@@ -254,18 +256,18 @@ impl Fields<'_> {
         negate.ok_or_else(|| self.error("negate", "0, 1, true or false"))
     }
 
-    fn mode(&self) -> Result<Mode, MapError> {
+    fn mode(&self) -> Result<GreyMode, MapError> {
         match self.find("mode") {
-            None => Ok(Mode::Trinary),
-            Some(Node::Text(text)) if text == "trinary" => Ok(Mode::Trinary),
-            Some(Node::Text(text)) if text == "scale" => Ok(Mode::Scale),
-            Some(Node::Text(text)) if text == "raw" => Ok(Mode::Raw),
+            None => Ok(GreyMode::Trinary),
+            Some(YamlValue::Text(text)) if text == "trinary" => Ok(GreyMode::Trinary),
+            Some(YamlValue::Text(text)) if text == "scale" => Ok(GreyMode::Scale),
+            Some(YamlValue::Text(text)) if text == "raw" => Ok(GreyMode::Raw),
             Some(_) => Err(self.error("mode", "trinary, scale or raw")),
         }
     }
 }
 
-fn parse_yaml(file: &str, text: &str) -> Result<Vec<(String, Node)>, MapError> {
+fn parse_yaml(file: &str, text: &str) -> Result<Vec<(String, YamlValue)>, MapError> {
     let options = serde_saphyr::options! {
         // Two orders of magnitude above any real map; aliases serve no purpose in one.
         budget: serde_saphyr::budget! {
@@ -280,19 +282,19 @@ fn parse_yaml(file: &str, text: &str) -> Result<Vec<(String, Node)>, MapError> {
         merge_keys: MergeKeyPolicy::AsOrdinary,
         non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
     };
-    let node: Node = serde_saphyr::from_str_with_options(text, options).map_err(|error| {
+    let node: YamlValue = serde_saphyr::from_str_with_options(text, options).map_err(|error| {
         let reason = error.without_snippet().to_string();
         MapError::syntax(file, format!("is no valid YAML: {}", reason.replace('\n', " ")))
     })?;
     match node {
-        Node::Entries(entries) => Ok(entries),
+        YamlValue::Entries(entries) => Ok(entries),
         _ => Err(MapError::syntax(file, "is no list of `key: value` lines, as a ROS map is")),
     }
 }
 
 /// A YAML value of any type, so that a wrong type can be reported with field and value.
 #[derive(Clone, Debug, PartialEq)]
-enum Node {
+enum YamlValue {
     Null,
     Bool(bool),
     Int(i64),
@@ -302,7 +304,7 @@ enum Node {
     Entries(Vec<(String, Self)>),
 }
 
-impl Node {
+impl YamlValue {
     /// The value as a number; quoted numbers count, as they do in Nav2.
     fn number(&self) -> Option<f64> {
         match self {
@@ -329,66 +331,66 @@ impl Node {
     }
 }
 
-impl<'de> Deserialize<'de> for Node {
+impl<'de> Deserialize<'de> for YamlValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(NodeVisitor)
+        deserializer.deserialize_any(YamlVisitor)
     }
 }
 
-struct NodeVisitor;
+struct YamlVisitor;
 
-impl<'de> Visitor<'de> for NodeVisitor {
-    type Value = Node;
+impl<'de> Visitor<'de> for YamlVisitor {
+    type Value = YamlValue;
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("a YAML value")
     }
 
-    fn visit_bool<E>(self, value: bool) -> Result<Node, E> {
-        Ok(Node::Bool(value))
+    fn visit_bool<E>(self, value: bool) -> Result<YamlValue, E> {
+        Ok(YamlValue::Bool(value))
     }
 
-    fn visit_i64<E>(self, value: i64) -> Result<Node, E> {
-        Ok(Node::Int(value))
+    fn visit_i64<E>(self, value: i64) -> Result<YamlValue, E> {
+        Ok(YamlValue::Int(value))
     }
 
-    fn visit_u64<E>(self, value: u64) -> Result<Node, E> {
-        Ok(i64::try_from(value).map_or(Node::Float(value as f64), Node::Int))
+    fn visit_u64<E>(self, value: u64) -> Result<YamlValue, E> {
+        Ok(i64::try_from(value).map_or(YamlValue::Float(value as f64), YamlValue::Int))
     }
 
-    fn visit_f64<E>(self, value: f64) -> Result<Node, E> {
-        Ok(Node::Float(value))
+    fn visit_f64<E>(self, value: f64) -> Result<YamlValue, E> {
+        Ok(YamlValue::Float(value))
     }
 
-    fn visit_str<E>(self, value: &str) -> Result<Node, E> {
-        Ok(Node::Text(value.to_owned()))
+    fn visit_str<E>(self, value: &str) -> Result<YamlValue, E> {
+        Ok(YamlValue::Text(value.to_owned()))
     }
 
-    fn visit_unit<E>(self) -> Result<Node, E> {
-        Ok(Node::Null)
+    fn visit_unit<E>(self) -> Result<YamlValue, E> {
+        Ok(YamlValue::Null)
     }
 
-    fn visit_none<E>(self) -> Result<Node, E> {
-        Ok(Node::Null)
+    fn visit_none<E>(self) -> Result<YamlValue, E> {
+        Ok(YamlValue::Null)
     }
 
-    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<Node, D::Error> {
-        Node::deserialize(deserializer)
+    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<YamlValue, D::Error> {
+        YamlValue::deserialize(deserializer)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Node, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<YamlValue, A::Error> {
         let mut list = Vec::new();
         while let Some(node) = seq.next_element()? {
             list.push(node);
         }
-        Ok(Node::List(list))
+        Ok(YamlValue::List(list))
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<YamlValue, A::Error> {
         let mut entries = Vec::new();
         while let Some(entry) = map.next_entry()? {
             entries.push(entry);
         }
-        Ok(Node::Entries(entries))
+        Ok(YamlValue::Entries(entries))
     }
 }

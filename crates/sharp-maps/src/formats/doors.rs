@@ -7,8 +7,8 @@ use std::path::Path;
 use serde::Deserialize;
 use sharp_space::Point;
 
-use crate::error::MapError;
-use crate::files::{self, Kind};
+use super::error::MapError;
+use super::files::{self, FileKind};
 
 /// A door in a map.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +29,7 @@ impl Door {
 }
 
 #[derive(Deserialize)]
-struct Entry {
+struct DoorEntry {
     name: String,
     door_corner_pt_1: [f64; 2],
     door_corner_pt_2: [f64; 2],
@@ -42,20 +42,20 @@ struct Entry {
 /// finite.
 pub fn load_doors(path: &Path) -> Result<Vec<Door>, MapError> {
     let file = path.display().to_string();
-    let bytes = files::read(path, Kind::Text)?;
+    let bytes = files::read(path, FileKind::Text)?;
     parse(&file, files::as_text(&file, &bytes)?)
 }
 
 fn parse(file: &str, text: &str) -> Result<Vec<Door>, MapError> {
-    let entries: Vec<Entry> = serde_saphyr::from_str(text).map_err(|error| {
+    let entries: Vec<DoorEntry> = serde_saphyr::from_str(text).map_err(|error| {
         let reason = error.without_snippet().to_string().replace('\n', " ");
         MapError::syntax(file, format!("is no list of doors: {reason}"))
     })?;
     entries.into_iter().map(|entry| door(file, entry)).collect()
 }
 
-fn door(file: &str, entry: Entry) -> Result<Door, MapError> {
-    let Entry { name, door_corner_pt_1: first, door_corner_pt_2: second } = entry;
+fn door(file: &str, entry: DoorEntry) -> Result<Door, MapError> {
+    let DoorEntry { name, door_corner_pt_1: first, door_corner_pt_2: second } = entry;
     if let Some(value) = first.iter().chain(&second).find(|value| !value.is_finite()) {
         return Err(MapError::syntax(file, format!("a corner of door {name:?} is {value}, must be finite")));
     }

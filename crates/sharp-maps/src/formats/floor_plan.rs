@@ -18,10 +18,10 @@
 use serde::Deserialize;
 use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Pose};
 
-use crate::error::MapError;
-use crate::load::check_size;
+use super::error::MapError;
+use super::load::check_size;
 
-/// A cell whose centre lies on an edge must not depend on rounding.
+/// Rounding must not decide about a cell whose centre lies on an edge, metres.
 const EDGE_M: f64 = 1e-6;
 
 #[derive(Debug, Deserialize)]
@@ -30,34 +30,34 @@ struct FloorPlan {
     size_m: (f64, f64),
     resolution_m: f64,
     wall_thickness_m: f64,
-    walls: Vec<Wall>,
+    walls: Vec<PlanWall>,
     #[serde(default)]
     furniture: Vec<Furniture>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-enum Wall {
+enum PlanWall {
     /// Along the x axis.
     Across {
         y: f64,
         x: (f64, f64),
         #[serde(default)]
-        doors: Vec<Door>,
+        doors: Vec<DoorGap>,
     },
     /// Along the y axis.
     Along {
         x: f64,
         y: (f64, f64),
         #[serde(default)]
-        doors: Vec<Door>,
+        doors: Vec<DoorGap>,
     },
 }
 
 /// A gap of `width` metres around the coordinate `at` along the wall.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Door {
+struct DoorGap {
     at: f64,
     width: f64,
 }
@@ -96,9 +96,9 @@ const SOUND: &str =
     "made of finite numbers, with intervals that run upwards, lengths above 0 and a part inside the map";
 
 /// Refuses doors that are not in their wall, or in each other.
-fn check_doors(file: &str, wall_field: &str, wall: &Wall) -> Result<(), MapError> {
-    let (Wall::Across { x: wall, doors, .. } | Wall::Along { y: wall, doors, .. }) = wall;
-    let span = |door: &Door| (door.at - 0.5 * door.width, door.at + 0.5 * door.width);
+fn check_doors(file: &str, wall_field: &str, wall: &PlanWall) -> Result<(), MapError> {
+    let (PlanWall::Across { x: wall, doors, .. } | PlanWall::Along { y: wall, doors, .. }) = wall;
+    let span = |door: &DoorGap| (door.at - 0.5 * door.width, door.at + 0.5 * door.width);
     for (number, door) in doors.iter().enumerate() {
         let (from, to) = span(door);
         let refuse = |expected| {
@@ -108,7 +108,7 @@ fn check_doors(file: &str, wall_field: &str, wall: &Wall) -> Result<(), MapError
         if !(from < to && from >= wall.0 - EDGE_M && to <= wall.1 + EDGE_M) {
             return refuse(format!("wider than 0 and within its wall, from {} to {}", wall.0, wall.1));
         }
-        let meets = |other: &&Door| from < span(other).1 - EDGE_M && span(other).0 < to - EDGE_M;
+        let meets = |other: &&DoorGap| from < span(other).1 - EDGE_M && span(other).0 < to - EDGE_M;
         if let Some(other) = doors[..number].iter().find(meets) {
             return refuse(format!("clear of the door {} m wide at {}", other.width, other.at));
         }
@@ -143,16 +143,16 @@ impl Canvas {
         Ok(Self { frame, half_thickness_m, cells: vec![Occupancy::Free; width * height] })
     }
 
-    /// Draws a wall, or gives back its text if it is unsound.
-    fn wall(&mut self, wall: &Wall) -> Result<(), String> {
+    /// Draws a wall. The error is the text of a wall that is not sound.
+    fn wall(&mut self, wall: &PlanWall) -> Result<(), String> {
         let half = self.half_thickness_m;
         let (line, span, doors) = match wall {
-            Wall::Across { y, x, doors } => (*y, *x, doors),
-            Wall::Along { x, y, doors } => (*x, *y, doors),
+            PlanWall::Across { y, x, doors } => (*y, *x, doors),
+            PlanWall::Along { x, y, doors } => (*x, *y, doors),
         };
         let (across_m, along_m) = match wall {
-            Wall::Across { .. } => (self.frame.height_m(), self.frame.width_m()),
-            Wall::Along { .. } => (self.frame.width_m(), self.frame.height_m()),
+            PlanWall::Across { .. } => (self.frame.height_m(), self.frame.width_m()),
+            PlanWall::Along { .. } => (self.frame.width_m(), self.frame.height_m()),
         };
         let is_inside = overlaps((line - half, line + half), across_m) && overlaps(span, along_m);
         if !(line.is_finite() && is_interval(span) && is_inside) {
@@ -160,14 +160,14 @@ impl Canvas {
         }
         for stretch in stretches((span.0 - half, span.1 + half), doors) {
             match wall {
-                Wall::Across { .. } => self.fill(stretch, (line - half, line + half), |_, _| true),
-                Wall::Along { .. } => self.fill((line - half, line + half), stretch, |_, _| true),
+                PlanWall::Across { .. } => self.fill(stretch, (line - half, line + half), |_, _| true),
+                PlanWall::Along { .. } => self.fill((line - half, line + half), stretch, |_, _| true),
             }
         }
         Ok(())
     }
 
-    /// Draws a piece of furniture, or gives back its text if it is unsound.
+    /// Draws a piece of furniture. The error is the text of a piece that is not sound.
     fn furniture(&mut self, piece: &Furniture) -> Result<(), String> {
         let (x, y) = match *piece {
             Furniture::Box { x, y } => (x, y),
@@ -212,12 +212,12 @@ fn overlaps((from, to): (f64, f64), length_m: f64) -> bool {
 }
 
 /// What the doors leave of a wall.
-fn stretches(wall: (f64, f64), doors: &[Door]) -> Vec<(f64, f64)> {
-    let mut gaps: Vec<Door> = doors.to_vec();
+fn stretches(wall: (f64, f64), doors: &[DoorGap]) -> Vec<(f64, f64)> {
+    let mut gaps: Vec<DoorGap> = doors.to_vec();
     gaps.sort_by(|a, b| a.at.total_cmp(&b.at));
     let mut stretches = Vec::with_capacity(gaps.len() + 1);
     let mut from = wall.0;
-    for Door { at, width } in gaps {
+    for DoorGap { at, width } in gaps {
         stretches.push((from, at - 0.5 * width));
         from = from.max(at + 0.5 * width);
     }
@@ -232,7 +232,7 @@ pub(crate) fn shell(text: &str) -> (OccupancyGrid, Vec<f64>) {
     let mut plan = read("plan", text).expect("a sound plan");
     let mut widths_m = Vec::new();
     for wall in &mut plan.walls {
-        let (Wall::Across { doors, .. } | Wall::Along { doors, .. }) = wall;
+        let (PlanWall::Across { doors, .. } | PlanWall::Along { doors, .. }) = wall;
         widths_m.extend(doors.drain(..).map(|door| door.width));
     }
     plan.furniture.clear();

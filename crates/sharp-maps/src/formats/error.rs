@@ -1,4 +1,4 @@
-//! What can be wrong with a map, said once: file, field, value, and what would be right.
+//! What can be wrong with a map. Each message names file, field and value, and what is allowed.
 
 use std::io;
 
@@ -69,7 +69,7 @@ pub enum MapError {
         field: String,
         /// Its value, or `missing`.
         value: String,
-        /// What would be right.
+        /// What is allowed.
         expected: String,
     },
     /// The image of a ROS map lies outside the map's folder.

@@ -1,6 +1,10 @@
-//! The part of a simulation that never changes: the map, ready for queries by one robot.
+//! The part of a simulation that never changes: the map, prepared for one robot.
 
-use sharp_space::{DistanceField, Footprint, FootprintChecker, GridFrame, OccupancyGrid, Pose, Vector};
+use std::sync::Arc;
+
+use sharp_space::{
+    DistanceField, Footprint, FootprintChecker, GridFrame, OccupancyGrid, Pose, RobotGeometry, Vector,
+};
 
 use crate::convert::Obstacles;
 use crate::rectangles::merge_blocked_cells;
@@ -16,44 +20,55 @@ pub struct Wall {
 
 /// The map around a robot of a given outline; shared by all simulators and their forks.
 #[derive(Clone, Debug)]
-pub struct World {
-    checker: FootprintChecker,
+pub struct ObstacleMap {
+    geometry: Arc<dyn RobotGeometry>,
     obstacles: Obstacles,
-    cover: Cover,
+    cover: DiscCover,
 }
 
-impl World {
+impl ObstacleMap {
     /// Prepares `grid` for a robot of outline `footprint`; whatever is not free blocks it, and so
     /// does the border of the grid.
     #[must_use]
     pub fn new(grid: &OccupancyGrid, footprint: Footprint) -> Self {
+        Self::with_geometry(grid, Arc::new(FootprintChecker::new(grid, footprint)))
+    }
+
+    /// Prepares `grid` for a robot whose outline `geometry` tests. Engines with contacts take the rectangle
+    /// around the outline, [`RobotGeometry::footprint`].
+    ///
+    /// # Panics
+    /// If `geometry` belongs to another grid.
+    #[must_use]
+    pub fn with_geometry(grid: &OccupancyGrid, geometry: Arc<dyn RobotGeometry>) -> Self {
+        assert_eq!(grid.frame(), geometry.clearance().frame(), "grid and geometry are of one map");
         Self {
-            checker: FootprintChecker::new(grid, footprint),
             obstacles: Obstacles::new(grid.frame(), &merge_blocked_cells(grid)),
-            cover: Cover::new(&footprint),
+            cover: DiscCover::new(geometry.footprint()),
+            geometry,
         }
     }
 
     /// Where the grid lies in the world.
     #[must_use]
     pub fn frame(&self) -> &GridFrame {
-        self.checker.field().frame()
+        self.field().frame()
     }
 
     /// The exact collision test of the robot's outline.
     #[must_use]
-    pub const fn checker(&self) -> &FootprintChecker {
-        &self.checker
+    pub fn checker(&self) -> &dyn RobotGeometry {
+        &*self.geometry
     }
 
     /// The distance field of the map.
     #[must_use]
     pub fn field(&self) -> &DistanceField {
-        self.checker.field()
+        self.geometry.clearance()
     }
 
-    /// Everything that blocks the robot as few boxes: the blocked cells, merged, and a border of one
-    /// metre around the grid.
+    /// Everything that blocks the robot, as few boxes: the blocked cells, merged, and a border of one metre
+    /// around the grid.
     pub fn walls(&self) -> impl Iterator<Item = Wall> {
         self.obstacles.walls()
     }
@@ -61,10 +76,11 @@ impl World {
     /// How far every point of the outline at `pose` can certainly move before it meets an obstacle,
     /// metres; 0 or less where only the exact test can tell.
     pub(crate) fn slack_m(&self, pose: &Pose) -> f64 {
-        let frame = self.frame();
+        let field = self.field();
+        let frame = field.frame();
         let at = |ahead_m: f64| {
             let center = pose.to_world(Vector::new(ahead_m, 0.0));
-            frame.cell_at(center).map_or(0.0, |cell| self.field().at(cell))
+            frame.cell_at(center).map_or(0.0, |cell| field.at(cell))
         };
         let least = self.cover.offsets_m.iter().map(|&offset| at(offset)).fold(f64::INFINITY, f64::min);
         // The field measures from cell centre to cell centre: half a diagonal at either end.
@@ -84,12 +100,12 @@ impl World {
 /// Three discs along the robot's axis that together cover its outline. More discs fit the sides
 /// better but stick out further in front.
 #[derive(Clone, Copy, Debug)]
-struct Cover {
+struct DiscCover {
     offsets_m: [f64; 3],
     radius_m: f64,
 }
 
-impl Cover {
+impl DiscCover {
     fn new(footprint: &Footprint) -> Self {
         let third_m = footprint.half_length_m() / 3.0;
         Self {
@@ -101,8 +117,6 @@ impl Cover {
 
 #[cfg(test)]
 mod tests {
-    use sharp_space::CollisionChecker;
-
     use super::*;
 
     #[test]
@@ -118,20 +132,20 @@ mod tests {
             ##########",
         )
         .unwrap();
-        let world = World::new(&grid, Footprint::rectangle(0.4, 0.2).unwrap());
+        let map = ObstacleMap::new(&grid, Footprint::rectangle(0.4, 0.2).unwrap());
         let mut roomy = 0;
         arbtest::arbtest(|u| {
             let mut number =
                 |max: f64| u.int_in_range(0..=100_000_u32).map(|i| f64::from(i) / 100_000.0 * max);
             let pose = Pose::new(number(5.0)?, number(3.0)?, number(6.3)?);
-            if world.slack_m(&pose) > 0.0 {
+            if map.slack_m(&pose) > 0.0 {
                 roomy += 1;
-                assert!(world.checker().is_free_exact(pose), "{pose:?}");
+                assert!(map.checker().is_free(pose), "{pose:?}");
             }
             Ok(())
         });
         assert!(roomy > 0, "the room has poses with slack");
-        assert!(world.slack_m(&Pose::new(f64::NAN, 0.0, 0.0)) < 0.0, "no slack nowhere");
-        assert!(!world.checker().is_free(Pose::new(f64::NAN, 0.0, 0.0)));
+        assert!(map.slack_m(&Pose::new(f64::NAN, 0.0, 0.0)) < 0.0, "a pose that is nowhere has no slack");
+        assert!(!map.checker().is_free(Pose::new(f64::NAN, 0.0, 0.0)));
     }
 }

@@ -6,8 +6,8 @@
 
 use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Pose};
 
-use crate::error::MapError;
-use crate::load::check_size;
+use super::error::MapError;
+use super::load::check_size;
 
 /// Reads the text of a map whose lower-left corner shall lie at the world's origin.
 pub(crate) fn parse(file: &str, text: &str, resolution_m: f64) -> Result<OccupancyGrid, MapError> {

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use sharp_space::{Occupancy, OccupancyGrid};
 
-use crate::error::MapError;
-use crate::ros::{FREE_THRESHOLD, OCCUPIED_THRESHOLD};
+use super::error::MapError;
+use super::ros::{FREE_THRESHOLD, OCCUPIED_THRESHOLD};
 
 /// Writes `grid` as a trinary ROS map: the YAML file `path` and a PGM image of the same stem beside
 /// it. Loading it gives an equal grid.
@@ -59,14 +59,14 @@ fn yaml(grid: &OccupancyGrid, image: &str) -> String {
     )
 }
 
-/// Writes a file beside `path` and moves it there, so that no reader ever sees half of it.
+/// Writes a file beside `path` and moves it there, so that no reader ever sees an incomplete file.
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), MapError> {
     let failed = |source| MapError::Write { file: path.display().to_string(), source };
     let (temporary, mut file) = create_beside(path).map_err(failed)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
     let moved = written.and_then(|()| fs::rename(&temporary, path));
     moved.map_err(|error| {
-        // The first failure is the one to report; a leftover is harmless.
+        // The first failure is the one to report. A leftover file does no harm.
         let _ = fs::remove_file(&temporary);
         failed(error)
     })

@@ -1,20 +1,20 @@
 //! The project's own environments, part of the program: a floor plan and five problems each.
 //!
-//! They stand in for the paper's environments (Section "Evaluating our approach"), whose files
-//! were not published: of the same sizes, in household and office style, drawn anew. `a` to `d` are
-//! 15 m wide in cells of 0.05 m, `e` to `g` 75 m in cells of 0.1 m.
+//! They stand in for the paper's environments (Section "Evaluating our approach"), whose files were not
+//! published. They have the same sizes and are drawn anew in household and office style. `a` to `d` are 15 m
+//! wide in cells of 0.05 m, `e` to `g` 75 m in cells of 0.1 m.
 
-use crate::error::MapError;
-use crate::floor_plan;
-use crate::load::{MapFile, Problem};
+use super::error::MapError;
+use super::floor_plan;
+use super::load::{MapFile, Problem};
 
 /// An environment's letter, floor plan and problems, from the files of its name.
 macro_rules! environments {
     ($($letter:literal)*) => {
         [$((
             $letter,
-            include_str!(concat!("../assets/", $letter, ".ron")),
-            include_str!(concat!("../assets/", $letter, ".problems.ron")),
+            include_str!(concat!("../../assets/", $letter, ".ron")),
+            include_str!(concat!("../../assets/", $letter, ".problems.ron")),
         )),*]
     };
 }
@@ -51,7 +51,7 @@ mod tests {
     use sharp_space::DistanceField;
 
     use super::*;
-    use crate::drivable::{Robot, drive_m};
+    use crate::formats::drivable::{DrivableRobot, drive_m};
 
     fn maps() -> impl Iterator<Item = MapFile> {
         named_maps().map(|name| find(name).expect("listed").expect("the assets are sound"))
@@ -80,7 +80,7 @@ mod tests {
     fn both_robots_can_drive_every_problem() {
         for map in maps() {
             let large = map.grid.frame().width_m() > 20.0;
-            for robot in [Robot::Husky, Robot::Limo] {
+            for robot in [DrivableRobot::Husky, DrivableRobot::Limo] {
                 let checker = robot.checker(&map.grid, 0.04);
                 for (number, problem) in map.problems.iter().enumerate() {
                     let length = drive_m(robot, &checker, problem.start, problem.goal);
@@ -96,11 +96,11 @@ mod tests {
     fn doors_for_the_limo_turn_the_husky_away() {
         for map in maps().take(4) {
             let last = map.problems[4];
-            let length_m = |robot: Robot| {
+            let length_m = |robot: DrivableRobot| {
                 let checker = robot.checker(&map.grid, 0.0);
                 drive_m(robot, &checker, last.start, last.goal).expect("tested above")
             };
-            let (husky_m, limo_m) = (length_m(Robot::Husky), length_m(Robot::Limo));
+            let (husky_m, limo_m) = (length_m(DrivableRobot::Husky), length_m(DrivableRobot::Limo));
             assert!(husky_m > 1.5 * limo_m, "{} P5: Husky {husky_m:.1} m, Limo {limo_m:.1} m", map.name);
         }
     }

@@ -1,14 +1,14 @@
-//! What the own environments are made of, counted: rooms, corridors, doors, channels, dead ends.
+//! Counts and sizes of what the own environments are made of: rooms, corridors, doors, channels, dead ends.
 //!
-//! With the doors shut and the furniture gone, the free space falls apart into pieces; a piece is a
-//! room or the corridors that belong together.
+//! With closed doors and without furniture, the free space consists of separate pieces. A piece is a room or
+//! a group of connected corridors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use sharp_space::{Cell, DistanceField, Occupancy, OccupancyGrid};
 
-use crate::floor_plan;
-use crate::named::plans;
+use super::floor_plan;
+use super::named::plans;
 
 /// A corridor is nowhere as wide, metres: where two of 2.1 m cross there is room for a disc of 2.97 m.
 const ROOM_WIDTH_M: f64 = 3.0;

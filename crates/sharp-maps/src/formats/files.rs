@@ -1,21 +1,21 @@
-//! Reading files that a stranger may have made: regular files only, never more than a limit.
+//! Reading files that may come from anywhere: regular files only, and never more bytes than a limit.
 
 use std::fs::{self, File, FileType};
 use std::io::Read;
 use std::path::Path;
 
-use crate::error::MapError;
+use super::error::MapError;
 
 /// What a file is read as, with the most bytes that makes sense for it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Kind {
+pub(crate) enum FileKind {
     /// YAML or RON: a person wrote it.
     Text,
     /// An image or a `MovingAI` map: a cell or more for every few bytes.
     Cells,
 }
 
-impl Kind {
+impl FileKind {
     const fn limit_bytes(self) -> u64 {
         match self {
             // Map descriptions have some hundred bytes, large floor plans some ten thousand.
@@ -36,7 +36,7 @@ impl Kind {
 /// Reads a regular file of at most the kind's limit.
 ///
 /// The file's type is looked at before it is opened, because opening a pipe waits for its writer.
-pub(crate) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, MapError> {
+pub(crate) fn read(path: &Path, kind: FileKind) -> Result<Vec<u8>, MapError> {
     let file = path.display().to_string();
     let unreadable = |source| MapError::Read { file: file.clone(), source };
     let metadata = fs::metadata(path).map_err(unreadable)?;
@@ -47,7 +47,7 @@ pub(crate) fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, MapError> {
     let mut bytes = Vec::new();
     if metadata.len() <= limit_bytes {
         let opened = File::open(path).map_err(unreadable)?;
-        // The length of a growing or a special file is not to be trusted.
+        // The length of a growing or a special file cannot be trusted.
         opened.take(limit_bytes + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     }
     if metadata.len().max(bytes.len() as u64) > limit_bytes {

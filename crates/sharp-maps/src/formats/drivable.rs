@@ -1,10 +1,8 @@
-//! Can a robot get there? A best-first search with the full footprint, for the tests of the own
-//! environments.
+//! Best-first search with the full footprint: can a robot get there? For the tests of the own environments.
 //!
-//! States are poses, one kept per bin of place and heading; both robots only drive forward, the
-//! Husky also turns in place, the Limo steers along arcs. The search is drawn to the goal by
-//! distances along the cells wide enough for the robot. A path found here is a proof; none found
-//! is a strong hint only.
+//! States are poses, one kept per bin of place and heading; both robots only drive forward, the Husky also
+//! turns in place, the Limo steers along arcs. Distances along the cells that are wide enough for the robot
+//! guide the search. A path that it finds is a proof. If it finds none, that is only a strong hint.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -19,14 +17,14 @@ const STEP_M: f64 = 0.15;
 
 /// A robot as far as this search needs it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Robot {
+pub(crate) enum DrivableRobot {
     /// 1.0 x 0.67 m, turns in place.
     Husky,
     /// 0.32 x 0.22 m, turns on arcs of 0.45 m.
     Limo,
 }
 
-impl Robot {
+impl DrivableRobot {
     /// The outline, `margin_m` larger on each side.
     pub(crate) fn checker(self, grid: &OccupancyGrid, margin_m: f64) -> FootprintChecker {
         let (half_length_m, half_width_m) = match self {
@@ -47,7 +45,12 @@ impl Robot {
 }
 
 /// The length of some path from `start` to within 0.25 m of `goal`, metres, if one is found.
-pub(crate) fn drive_m(robot: Robot, checker: &FootprintChecker, start: Pose, goal: Pose) -> Option<f64> {
+pub(crate) fn drive_m(
+    robot: DrivableRobot,
+    checker: &FootprintChecker,
+    start: Pose,
+    goal: Pose,
+) -> Option<f64> {
     let frame = checker.field().frame();
     let to_goal_m = distances_m(checker, goal);
     let (cols, rows) = ((frame.width_m() / BIN_M) as usize + 1, (frame.height_m() / BIN_M) as usize + 1);

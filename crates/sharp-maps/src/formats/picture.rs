@@ -1,4 +1,4 @@
-//! Decoding of map images into grey values, with the checks that decoders leave out.
+//! Decoding of map images into grey values, with checks that the decoders do not make.
 //!
 //! A PGM that was saved with CR LF line ends is shifted by one byte, and one that was cut or
 //! appended to is read without complaint by many tools; here the file must end where its header
@@ -9,15 +9,15 @@ use std::io::Cursor;
 use image::codecs::pnm::PnmDecoder;
 use image::{DynamicImage, GenericImageView, ImageDecoder, ImageFormat, ImageReader, Limits};
 
-use crate::error::MapError;
-use crate::load::check_size;
+use super::error::MapError;
+use super::load::check_size;
 
 /// Decoded images above this are refused: the largest map in 8-bit RGBA.
 const DECODED_BYTES_MAX: u64 = 1 << 28;
 
 /// An image in 8-bit grey, row 0 at the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Picture {
+pub(crate) struct GreyImage {
     /// Columns.
     pub(crate) width: usize,
     /// Rows.
@@ -34,7 +34,7 @@ pub(crate) fn is_picture(bytes: &[u8]) -> bool {
 }
 
 /// Decodes PNG, BMP and PNM (P1 to P6), told apart by their first bytes.
-pub(crate) fn decode(file: &str, bytes: &[u8]) -> Result<Picture, MapError> {
+pub(crate) fn decode(file: &str, bytes: &[u8]) -> Result<GreyImage, MapError> {
     let image = match format_of(bytes) {
         Some(ImageFormat::Pnm) => decode_pnm(file, bytes)?,
         Some(format) => {
@@ -95,15 +95,15 @@ fn decode_pnm(file: &str, bytes: &[u8]) -> Result<DynamicImage, MapError> {
     ))
 }
 
-fn to_grey(image: DynamicImage) -> Picture {
+fn to_grey(image: DynamicImage) -> GreyImage {
     let (width, height) = (image.width() as usize, image.height() as usize);
     if let DynamicImage::ImageLuma8(grey) = image {
-        return Picture { width, height, grey: grey.into_raw(), transparent: None };
+        return GreyImage { width, height, grey: grey.into_raw(), transparent: None };
     }
     let transparent =
         image.color().has_alpha().then(|| image.pixels().map(|(_, _, rgba)| rgba[3] < 255).collect());
     let grey = image.pixels().map(|(_, _, rgba)| intensity(rgba.0)).collect();
-    Picture { width, height, grey, transparent }
+    GreyImage { width, height, grey, transparent }
 }
 
 /// Grey value of a colour with the weights of the image library behind Nav2 (ITU-R BT.601).

@@ -1,13 +1,13 @@
-//! From what the user typed to a grid: content and ending decide what kind of map it is.
+//! From what the user typed to a grid. Content and ending of the file decide what kind of map it is.
 
 use std::path::Path;
 
 use serde::Deserialize;
 use sharp_space::{OccupancyGrid, Pose};
 
-use crate::error::MapError;
-use crate::files::{self, Kind};
-use crate::{floor_plan, movingai, named, picture, ros};
+use super::error::MapError;
+use super::files::{self, FileKind};
+use super::{floor_plan, movingai, named, picture, ros};
 
 /// The side length above which Nav2 refuses a map.
 pub(crate) const SIDE_MAX: usize = 32_767;
@@ -27,13 +27,13 @@ pub struct LoadOptions {
     pub allow_outside: bool,
 }
 
-/// A question posed in an environment: from where to where.
+/// A problem posed in an environment: a start and a goal.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Problem {
     /// Where the robot starts.
     pub start: Pose,
-    /// Where it shall go.
+    /// Where it must arrive.
     pub goal: Pose,
 }
 
@@ -46,7 +46,7 @@ pub struct MapFile {
     pub grid: OccupancyGrid,
     /// The problems posed in an own environment; none for files.
     pub problems: Vec<Problem>,
-    /// What was accepted but is likely not meant, one sentence each.
+    /// What was accepted but is probably a mistake, one sentence each.
     pub warnings: Vec<String>,
 }
 
@@ -79,7 +79,7 @@ fn load_file(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
     let grid = match ending.as_str() {
         "yaml" | "yml" => ros::load(path, options, &mut warnings)?,
         "ron" => {
-            let bytes = files::read(path, Kind::Text)?;
+            let bytes = files::read(path, FileKind::Text)?;
             floor_plan::parse(spec, files::as_text(spec, &bytes)?)?
         }
         _ => load_cells(spec, &ending, options)?,
@@ -93,7 +93,7 @@ fn load_file(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
 
 /// Images and `MovingAI` maps: files that hold the cells themselves.
 fn load_cells(spec: &str, ending: &str, options: &LoadOptions) -> Result<OccupancyGrid, MapError> {
-    let bytes = files::read(Path::new(spec), Kind::Cells)?;
+    let bytes = files::read(Path::new(spec), FileKind::Cells)?;
     if picture::is_picture(&bytes) {
         let expected = "given in metres a pixel, as a plain image does not state it";
         let resolution_m =
