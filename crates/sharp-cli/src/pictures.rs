@@ -64,10 +64,7 @@ pub(crate) fn plan(plan: &Plan, query: &Query, executions: &[Execution]) -> Stri
     let targets: Vec<Point> = steps.iter().map(|planned| planned.option.target.center()).collect();
     let trajectories: Vec<Trajectory> = executions
         .iter()
-        .map(|run| Trajectory {
-            poses: run.record.trace.clone(),
-            failed: run.end != EpisodeEnd::Reached,
-        })
+        .map(|run| Trajectory { poses: run.record.trace.clone(), failed: run.end != EpisodeEnd::Reached })
         .collect();
     Scene::new(&plan.world.grid)
         .states(&|cell| rbvd.state_of(cell).map(|state| state.0))
