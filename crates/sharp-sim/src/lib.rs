@@ -58,3 +58,4 @@ pub use robot::{Drive, RobotError, RobotModel};
 pub use simulator::{AnySim, ForkSimulator, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
 pub use state::{RobotState, WheelCommand};
 pub use vehicle::{ActionReport, ActionSettings, Vehicle, VehicleSnapshot};
+pub use wheels::approach;
