@@ -5,7 +5,7 @@
 use anyhow::Context;
 use serde_json::Value;
 
-use super::Problem;
+use super::Finding;
 use crate::process::cargo;
 
 /// The crates of the workspace, bottom layer first, each with the ones it may use.
@@ -103,11 +103,11 @@ fn package(value: &Value) -> Package {
 }
 
 /// Checks the packages against the tables above.
-pub(super) fn check(packages: &[Package]) -> Vec<Problem> {
+pub(super) fn check(packages: &[Package]) -> Vec<Finding> {
     let is_ours = |name: &str| packages.iter().any(|package| package.name == name);
     let mut problems = Vec::new();
     for package in packages {
-        let mut report = |message| problems.push(Problem::new(&manifest(&package.name), 1, message));
+        let mut report = |message| problems.push(Finding::new(&manifest(&package.name), 1, message));
         let Some((_, edges)) = EDGES.iter().find(|(name, _)| *name == package.name) else {
             report(format!("{} has no layer, add it to xtask/src/tidy/layers.rs", package.name));
             continue;
