@@ -9,7 +9,7 @@ use super::Finding;
 use crate::process::cargo;
 
 /// The crates of the workspace, bottom layer first, each with the ones it may use.
-const EDGES: [(&str, &[&str]); 13] = [
+const EDGES: [(&str, &[&str]); 14] = [
     ("sharp-space", &[]),
     ("sharp-rl", &[]),
     ("xtask", &[]),
@@ -32,6 +32,8 @@ const EDGES: [(&str, &[&str]); 13] = [
             "sharp-rl",
         ],
     ),
+    // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
+    ("sharp-draw", &["sharp-space"]),
     ("sharp-cli", EVERYTHING),
     ("sharp-tests", EVERYTHING),
 ];
@@ -51,6 +53,7 @@ const EVERYTHING: &[&str] = &[
     "sharp-options",
     "sharp-guide",
     "sharp-plan",
+    "sharp-draw",
 ];
 
 /// Families of heavy packages, by the beginning of their names, and the crates that may name them.

@@ -9,7 +9,7 @@ use super::Finding;
 use crate::process::cargo;
 
 /// Licences whose terms a binary of this project can meet; `deny.toml` holds the same list.
-const ALLOWED: [&str; 12] = [
+const ALLOWED: [&str; 13] = [
     "0BSD",
     "Apache-2.0",
     "Apache-2.0 WITH LLVM-exception",
@@ -19,6 +19,8 @@ const ALLOWED: [&str; 12] = [
     "CC0-1.0",
     "ISC",
     "MIT",
+    // Fonts only: they may be embedded in a program, and stay under it themselves.
+    "OFL-1.1",
     "Unicode-3.0",
     "Unlicense",
     "Zlib",
