@@ -157,7 +157,8 @@ mod tests {
 
     #[test]
     fn tests_go_and_what_comes_after_them_stays() {
-        let code = "a();\n#[cfg(test)]\nmod test_worlds;\n\nb();\n#[cfg(test)]\nmod tests {\n{ c(); }\n}\nd();\n";
+        let code =
+            "a();\n#[cfg(test)]\nmod test_worlds;\n\nb();\n#[cfg(test)]\nmod tests {\n{ c(); }\n}\nd();\n";
         assert_eq!(without_tests(code), "a();\n\n\n\nb();\n\n\n\n\nd();\n");
     }
 
@@ -170,7 +171,9 @@ mod tests {
 
     #[test]
     fn tests_and_benches_are_told_by_their_place() {
-        for path in ["crates/a/tests/b.rs", "crates/a/benches/b.rs", "crates/a/src/tests.rs", "tests/it/main.rs"] {
+        for path in
+            ["crates/a/tests/b.rs", "crates/a/benches/b.rs", "crates/a/src/tests.rs", "tests/it/main.rs"]
+        {
             assert!(is_test_file(path), "{path}");
         }
         for path in ["crates/a/src/lib.rs", "crates/a/examples/b.rs", "tests/downstream/a/src/main.rs"] {

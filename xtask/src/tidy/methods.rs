@@ -15,7 +15,11 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
     let is_bound = |path: &str| path.starts_with("crates/") && path != OWNER && !is_example(path);
     for (path, code) in sources(tree).filter(|(path, _)| is_bound(path)) {
         let mut report = |at: usize, message: &str| {
-            problems.push(Finding::new(path, line_of(&code, at), format!("{message}: make it a field of `Method`")));
+            problems.push(Finding::new(
+                path,
+                line_of(&code, at),
+                format!("{message}: make it a field of `Method`"),
+            ));
         };
         for at in branches(&code) {
             report(at, "asks which method is at work");

@@ -24,7 +24,11 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
     for (name, places) in places.iter().filter(|(name, places)| places.len() > 1 && !is_free(name)) {
         let (first, line) = places[0];
         for (path, at) in &places[1..] {
-            problems.push(Finding::new(path, *at, format!("the type {name} stands in {first}:{line} as well")));
+            problems.push(Finding::new(
+                path,
+                *at,
+                format!("the type {name} stands in {first}:{line} as well"),
+            ));
         }
     }
     problems
@@ -53,7 +57,10 @@ mod tests {
     #[test]
     fn the_second_declaration_is_named() {
         let tree = Tree::of(&[
-            ("crates/a/src/lib.rs", "//! struct World;\npub struct World {}\n#[cfg(test)]\nmod tests { struct B; }"),
+            (
+                "crates/a/src/lib.rs",
+                "//! struct World;\npub struct World {}\n#[cfg(test)]\nmod tests { struct B; }",
+            ),
             ("crates/b/src/lib.rs", "struct B(u8);\n\nenum World {}"),
             ("crates/b/tests/own.rs", "struct World;"),
         ]);
@@ -66,7 +73,8 @@ mod tests {
 
     #[test]
     fn all_four_declarations_count() {
-        let code = "pub(crate) struct A;\nenum B {}\npub trait C: D {}\nunion E { f: u8 }\nstruct Generic<T>(T);";
+        let code =
+            "pub(crate) struct A;\nenum B {}\npub trait C: D {}\nunion E { f: u8 }\nstruct Generic<T>(T);";
         let mut names: Vec<String> = declared(code).into_iter().map(|(name, _)| name).collect();
         names.sort();
         assert_eq!(names, ["A", "B", "C", "E", "Generic"]);

@@ -92,7 +92,13 @@ mod tests {
 
     #[test]
     fn others_act_through_an_episode() {
-        for code in ["self.episode.act(command)", "model.act(&mut state)", "episode.back_off()", "// vehicle.act(p)", "environment.step(a, o)"] {
+        for code in [
+            "self.episode.act(command)",
+            "model.act(&mut state)",
+            "episode.back_off()",
+            "// vehicle.act(p)",
+            "environment.step(a, o)",
+        ] {
             assert_eq!(problems("crates/sharp-drive/src/task.rs", code), 0, "{code}");
         }
     }
@@ -100,7 +106,10 @@ mod tests {
     #[test]
     fn vehicles_come_from_the_world() {
         assert_eq!(problems("crates/sharp-plan/src/execute.rs", "let v = Vehicle::new(sim, robot);"), 1);
-        assert_eq!(problems("crates/sharp-plan/src/execute.rs", "let v = world.vehicle(&sim); AnyVehicle::f()"), 0);
+        assert_eq!(
+            problems("crates/sharp-plan/src/execute.rs", "let v = world.vehicle(&sim); AnyVehicle::f()"),
+            0
+        );
         assert_eq!(problems(MAKER, "Vehicle::new(sim, robot)"), 0);
     }
 }

@@ -88,14 +88,8 @@ mod tests {
     #[test]
     fn what_is_missing_is_named() {
         assert_eq!(problems(&[ROOT, EXAMPLE]), ["the trait Trait has no suite in crates/a/src/conformance"]);
-        assert_eq!(
-            problems(&[SUITE, EXAMPLE]),
-            ["the suite of Trait is not public: pub mod conformance"]
-        );
-        assert_eq!(
-            problems(&[ROOT, SUITE]),
-            ["no file of crates/a/examples implements the trait Trait"]
-        );
+        assert_eq!(problems(&[SUITE, EXAMPLE]), ["the suite of Trait is not public: pub mod conformance"]);
+        assert_eq!(problems(&[ROOT, SUITE]), ["no file of crates/a/examples implements the trait Trait"]);
     }
 
     #[test]
