@@ -26,6 +26,8 @@
 //! # Ok::<(), sharp_plan::SolveError>(())
 //! ```
 
+pub mod conformance;
+
 mod abstraction;
 mod algorithm;
 mod composed;
