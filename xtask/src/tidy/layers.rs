@@ -9,7 +9,7 @@ use super::Problem;
 use crate::process::cargo;
 
 /// The crates of the workspace, bottom layer first, each with the ones it may use.
-const EDGES: [(&str, &[&str]); 14] = [
+const EDGES: [(&str, &[&str]); 15] = [
     ("sharp-space", &[]),
     ("sharp-rl", &[]),
     ("xtask", &[]),
@@ -34,6 +34,8 @@ const EDGES: [(&str, &[&str]); 14] = [
     ),
     // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
     ("sharp-draw", &["sharp-space"]),
+    // Results and their report: the planner for its tallies, pictures for its figures.
+    ("sharp-bench", &["sharp-plan", "sharp-draw"]),
     ("sharp-cli", EVERYTHING),
     ("sharp-tests", EVERYTHING),
 ];
@@ -50,6 +52,7 @@ const EVERYTHING: &[&str] = &[
     "sharp-guide",
     "sharp-plan",
     "sharp-draw",
+    "sharp-bench",
 ];
 
 /// Families of heavy packages, by the beginning of their names, and the crates that may name them.
