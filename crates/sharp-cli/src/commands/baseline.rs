@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
+use sharp_bench::DecisionTimes;
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::{
     Baseline as System, ComparisonSettings, Driven, EpisodeEnd, Host, Mppi, MppiSettings, PacedFollower,
@@ -18,7 +19,7 @@ use crate::curves::CurveFolder;
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{Stopwatch, is_interrupted, spinner};
-use crate::report::{DecisionTimes, MapReport};
+use crate::report::MapReport;
 
 /// Wall time that the paper gives its baselines, seconds.
 const TIME_LIMIT_S: f64 = 2400.0;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::ProgressBar;
+use sharp_bench::{Reuse, SolveTimes};
 use sharp_guide::GuidePlanner;
 use sharp_maps::MapFile;
 use sharp_plan::{
@@ -15,7 +16,7 @@ use crate::args::{Guide, Learning, Solve, Switch};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::pipeline::{self, Built};
 use crate::progress::{SolveMonitor, Stopwatch, is_interrupted, spinner};
-use crate::report::{MapReport, Reuse, SolveReport, SolveTimes};
+use crate::report::{MapReport, SolveReport};
 use crate::{input, pictures};
 
 impl From<Learning> for LearningMode {
