@@ -1,7 +1,9 @@
 //! How long does the guide of one option take: 4 to 10 m in a furnished 15 m map, cells of 0.067 m?
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use sharp_guide::{GuideEnd, GuidePlanner, GuideRequest, GuideSettings, Steering, plan_guide};
+use sharp_guide::{
+    ClearanceSearch, GuideEnd, GuidePlanner, GuideRequest, GuideRobot, LearnAndLink, Steering,
+};
 use sharp_maps::{FloorplanKind, generate};
 use sharp_space::{Footprint, FootprintChecker, Point, Seed};
 
@@ -25,18 +27,20 @@ fn bench(c: &mut Criterion) {
     let grid = generate(FloorplanKind::FurnishedRooms, 15.0, 0.067, &mut Seed(5).stream("map", 0));
     let husky = Footprint::rectangle(0.5, 0.335).expect("sound");
     let limo = Footprint::rectangle(0.161, 0.11).expect("sound");
-    for (name, footprint, steering, planner) in [
-        ("guide_ridge/husky", husky, Steering::RotateTranslate, GuidePlanner::Ridge),
-        ("guide_ridge/limo", limo, Steering::Dubins { radius_m: 0.4 }, GuidePlanner::Ridge),
-        ("guide_learn_and_link/husky", husky, Steering::RotateTranslate, GuidePlanner::LearnAndLink),
-    ] {
+    let (search, link) = (&ClearanceSearch::default(), &LearnAndLink::default());
+    let cases: [(&str, Footprint, Steering, &dyn GuidePlanner); 3] = [
+        ("guide_search/husky", husky, Steering::RotateTranslate, search),
+        ("guide_search/limo", limo, Steering::Dubins { radius_m: 0.4 }, search),
+        ("guide_learn_and_link/husky", husky, Steering::RotateTranslate, link),
+    ];
+    for (name, footprint, steering, planner) in cases {
         let checker = FootprintChecker::new(&grid, footprint);
-        let settings = GuideSettings { planner, ..GuideSettings::default() };
+        let robot = GuideRobot::new(&checker, steering);
         let requests = requests(&checker);
         let plan = |i: usize| {
             let (start, goal) = requests[i % requests.len()];
             let request = GuideRequest { start, goal, allowed: &|_| true };
-            plan_guide(&request, &checker, &steering, &settings, &mut Seed(1).stream("guide", i as u64))
+            planner.plan(&request, &robot, &mut Seed(1).stream("guide", i as u64))
         };
         let planned = (0..requests.len()).filter(|&i| plan(i).is_ok()).count();
         assert!(planned * 10 >= requests.len() * 8, "{name}: {planned} of {} guides", requests.len());

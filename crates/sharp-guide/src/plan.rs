@@ -79,3 +79,55 @@ fn attempts(settings: &GuideSettings, resolution_m: f64) -> [Attempt; 4] {
         },
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_motion::Steering;
+    use sharp_space::{Footprint, FootprintChecker, OccupancyGrid};
+
+    use super::*;
+    use crate::request::GuideEnd;
+
+    /// Two rooms, one door of 1.2 m whose middle is at (4.1, 1.9); cells of 0.2 m.
+    fn rooms(is_open: bool) -> FootprintChecker {
+        let row = |row: usize| match row {
+            0 | 18 => "#".repeat(41),
+            7..=12 if is_open => format!("#{}#", ".".repeat(39)),
+            _ => format!("#{0}#{0}#", ".".repeat(19)),
+        };
+        let drawing: Vec<String> = (0..19).rev().map(row).collect();
+        let grid = OccupancyGrid::from_ascii(0.2, &drawing.join("\n")).expect("a sound drawing");
+        FootprintChecker::new(&grid, Footprint::rectangle(0.5, 0.335).expect("a sound outline"))
+    }
+
+    fn smooth(
+        checker: &FootprintChecker,
+        way: &[Point],
+        discs: &[(Point, f64)],
+    ) -> Result<GuidePath, NoGuide> {
+        let end = |position| GuideEnd { position, heading: None };
+        let request = GuideRequest { start: end(way[0]), goal: end(way[way.len() - 1]), allowed: &|_| true };
+        let robot = GuideRobot::new(checker, Steering::RotateTranslate);
+        smooth_guide((way, discs), &request, &robot, &GuideSettings::default())
+    }
+
+    #[test]
+    fn a_way_of_ones_own_becomes_smooth_and_keeps_to_its_discs() {
+        let way = [(1.2, 1.0), (2.6, 3.0), (4.1, 1.9), (7.0, 1.9)].map(|(x, y)| Point::new(x, y));
+        let off_m = |guide: &GuidePath| {
+            guide.poses().iter().map(|pose| (pose.position - way[1]).norm()).fold(f64::INFINITY, f64::min)
+        };
+        let open = rooms(true);
+        let free = smooth(&open, &way, &[]).expect("a room");
+        let held = smooth(&open, &way, &[(way[1], 0.2)]).expect("a room");
+        assert!(off_m(&free) > 0.4, "the corner is cut: {} m", off_m(&free));
+        assert!(off_m(&held) < 0.35, "the disc is missed by {} m", off_m(&held) - 0.2);
+        for guide in [&free, &held] {
+            let bends = guide.poses().windows(2).map(|pair| pair[0].heading.turn_to(pair[1].heading).abs());
+            let worst_rad = bends.fold(0.0, f64::max);
+            assert!(worst_rad < 0.8, "a kink of {worst_rad} rad");
+        }
+        let refused = smooth(&rooms(false), &[way[0], way[3]], &[]);
+        assert!(matches!(refused, Err(NoGuide::Footprint(_))), "{refused:?}");
+    }
+}

@@ -2,7 +2,8 @@
 
 use rand::RngExt;
 use sharp_guide::{
-    GuideEnd, GuidePath, GuidePlanner, GuideRequest, GuideSettings, NoGuide, Steering, plan_guide,
+    ClearanceSearch, GuideEnd, GuidePath, GuidePlanner, GuideRequest, GuideRobot, LearnAndLink, NoGuide,
+    Steering,
 };
 use sharp_maps::{FloorplanKind, generate};
 use sharp_space::{
@@ -66,7 +67,7 @@ fn check_guide(guide: &GuidePath, request: &GuideRequest<'_>, checker: &Footprin
 }
 
 /// Plans all pairs on one map of each kind; returns how many were asked for and the failures.
-fn plan_everywhere(robot: &Robot, settings: &GuideSettings) -> (usize, Vec<(FloorplanKind, NoGuide)>) {
+fn plan_everywhere(robot: &Robot, planner: &dyn GuidePlanner) -> (usize, Vec<(FloorplanKind, NoGuide)>) {
     let (mut asked, mut failures) = (0, Vec::new());
     for (number, kind) in FloorplanKind::ALL.into_iter().enumerate() {
         let grid = generate(kind, 15.0, 0.067, &mut Seed(9).stream("map", number as u64));
@@ -77,7 +78,7 @@ fn plan_everywhere(robot: &Robot, settings: &GuideSettings) -> (usize, Vec<(Floo
             let allowed = |cell: Cell| cell.col > 8;
             let request = GuideRequest { start: end(start), goal: end(goal), allowed: &allowed };
             let mut rng = Seed(1).stream("guide", 0);
-            match plan_guide(&request, &checker, &robot.steering, settings, &mut rng) {
+            match planner.plan(&request, &GuideRobot::new(&checker, robot.steering), &mut rng) {
                 Ok(guide) => {
                     check_guide(&guide, &request, &checker, robot);
                     asked += 1;
@@ -95,9 +96,9 @@ fn plan_everywhere(robot: &Robot, settings: &GuideSettings) -> (usize, Vec<(Floo
 }
 
 #[test]
-fn ridge_guides_fulfil_definition_8_nearly_everywhere() {
+fn clearance_guides_fulfil_definition_8_nearly_everywhere() {
     for robot in robots() {
-        let (asked, failures) = plan_everywhere(&robot, &GuideSettings::default());
+        let (asked, failures) = plan_everywhere(&robot, &ClearanceSearch::default());
         println!("{}: {} of {asked} failed: {failures:?}", robot.name, failures.len());
         assert!(asked > 100, "only {asked} queries make sense");
         assert!(failures.len() * 20 < asked, "{}: {asked} asked, failed: {failures:?}", robot.name);
@@ -109,14 +110,14 @@ fn equal_seeds_give_equal_guides() {
     let robot = &robots()[0];
     let grid = generate(FloorplanKind::Rooms, 15.0, 0.067, &mut Seed(2).stream("map", 0));
     let checker = FootprintChecker::new(&grid, robot.footprint);
-    for planner in [GuidePlanner::Ridge, GuidePlanner::LearnAndLink] {
-        let settings = GuideSettings { planner, ..GuideSettings::default() };
+    let planners: [&dyn GuidePlanner; 2] = [&ClearanceSearch::default(), &LearnAndLink::default()];
+    for planner in planners {
         for (start, goal) in pairs(&checker, 3).into_iter().take(4) {
             let end = |position| GuideEnd { position, heading: None };
             let request = GuideRequest { start: end(start), goal: end(goal), allowed: &|_| true };
             let plan = || {
                 let mut rng = Seed(1).stream("guide", 0);
-                plan_guide(&request, &checker, &robot.steering, &settings, &mut rng)
+                planner.plan(&request, &GuideRobot::new(&checker, robot.steering), &mut rng)
             };
             assert_eq!(plan(), plan(), "{planner:?} from {start} to {goal}");
         }
@@ -140,8 +141,8 @@ fn robots_that_look_elsewhere_are_led_onto_the_path() {
                 let goal = GuideEnd { position: goal, heading: None };
                 let request = GuideRequest { start, goal, allowed: &|_| true };
                 let mut rng = Seed(1).stream("guide", 0);
-                let plan =
-                    plan_guide(&request, &checker, &robot.steering, &GuideSettings::default(), &mut rng);
+                let guide_robot = GuideRobot::new(&checker, robot.steering);
+                let plan = ClearanceSearch::default().plan(&request, &guide_robot, &mut rng);
                 let Ok(guide) = plan else { continue };
                 check_guide(&guide, &request, &checker, &robot);
                 planned += 1;

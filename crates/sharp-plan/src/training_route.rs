@@ -96,17 +96,24 @@ pub fn training_routes(
 pub struct RouteScenarios {
     routes: Arc<Vec<TrainingRoute>>,
     noises: Arc<Vec<NoiseModel>>,
+    simulator: SimulatorKind,
 }
 
 impl RouteScenarios {
-    /// Parts of `routes` under `noises`.
+    /// Parts of `routes` under `noises`, in the kinematic simulator.
     ///
     /// # Panics
     /// If there are no routes or no noises.
     #[must_use]
     pub fn new(routes: Arc<Vec<TrainingRoute>>, noises: Arc<Vec<NoiseModel>>) -> Self {
         assert!(!routes.is_empty() && !noises.is_empty(), "training needs routes and noises");
-        Self { routes, noises }
+        Self { routes, noises, simulator: SimulatorKind::Kinematic }
+    }
+
+    /// The same in another simulator.
+    #[must_use]
+    pub fn with_simulator(self, simulator: SimulatorKind) -> Self {
+        Self { simulator, ..self }
     }
 }
 
@@ -123,7 +130,7 @@ impl ScenarioSource for RouteScenarios {
         let reward = ProgressReward { contact, success: 1.0, stray: 0.0, ..ProgressReward::default() };
         let link = |index: usize| Link::new(Arc::clone(&options[index]), options.get(index + 1).cloned());
         Scenario {
-            simulator: world.simulator(SimulatorKind::Kinematic),
+            simulator: world.simulator(self.simulator),
             interface: interface(world, PolicyContext::new(&noise, caution as f32)),
             noise,
             links: (first..=last).map(link).collect(),

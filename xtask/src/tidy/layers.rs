@@ -61,7 +61,7 @@ const ROOMS: [Room; 16] = [
             "sharp-rl",
             "sharp-drive",
         ],
-        &[],
+        &["sharp-regions"],
     ),
     room(
         5,
