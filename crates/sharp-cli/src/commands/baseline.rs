@@ -8,7 +8,7 @@ use sharp_bench::{
     ComparisonSettings, Contender as System, DecisionTimes, Driven, Mpc, RoutePlanner, Rrt, Sac, SacBudget,
     Track, compare,
 };
-use sharp_drive::{EpisodeEnd, MppiSettings, ProfiledFollower, SuccessCount, Wall, World};
+use sharp_drive::{EpisodeEnd, MppiSettings, ProfiledFollower, SuccessCount, Supervisor, World};
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::{Conditions, Query};
 use sharp_rl::Progress;
@@ -223,8 +223,8 @@ impl Bench<'_> {
         stopwatch.enter("drive");
         let begun = Instant::now();
         let clock_us = || begun.elapsed().as_secs_f64() * 1e6;
-        let wall = Wall { clock_us: &clock_us, should_stop: stop };
-        let driven = compare(system, &self.world, &self.query, &self.settings, &wall);
+        let supervisor = Supervisor { clock_us: &clock_us, should_stop: stop };
+        let driven = compare(system, &self.world, &self.query, &self.settings, &supervisor);
         stopwatch.stop();
         Measured { driven, ..Measured::default() }
     }
