@@ -56,7 +56,8 @@ pub fn check_contender(
     query: &Query,
 ) -> Result<(), ContenderViolation> {
     for episode in [0, 1] {
-        let (first, second) = (drive(contender, world, query, episode), drive(contender, world, query, episode));
+        let (first, second) =
+            (drive(contender, world, query, episode), drive(contender, world, query, episode));
         first.check(world, query)?;
         if first != second {
             let pairs = first.decisions.iter().zip(&second.decisions);
