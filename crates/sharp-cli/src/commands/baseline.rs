@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use sharp_bench::{
-    ComparisonSettings, Contender as System, Driven, Mpc, RoutePlanner, Rrt, Sac, SacBudget, Track, compare,
+    ComparisonSettings, Contender as System, DecisionTimes, Driven, Mpc, RoutePlanner, Rrt, Sac, SacBudget,
+    Track, compare,
 };
 use sharp_drive::{EpisodeEnd, MppiSettings, ProfiledFollower, SuccessCount, Wall, World};
 use sharp_motion::{Budget, RrtSettings};
@@ -19,7 +20,7 @@ use crate::curves::CurveFolder;
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{Stopwatch, is_interrupted, spinner};
-use crate::report::{DecisionTimes, MapReport};
+use crate::report::MapReport;
 
 /// Wall time that the paper gives its baselines, seconds.
 const TIME_LIMIT_S: f64 = 2400.0;
