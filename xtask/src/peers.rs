@@ -55,7 +55,7 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
         Some(map) if MAPS.contains(&map) => vec![map],
         Some(map) => bail!("no map is called {map:?}, there are {}", MAPS.join(", ")),
     };
-    let sides = Sides::prepare(seconds.to_string())?;
+    let sides = SimulatorSides::prepare(seconds.to_string())?;
     for map in maps {
         for line in sides.compare(map, rounds)? {
             if writeln!(std::io::stdout(), "{line}").is_err() {
@@ -68,14 +68,14 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
 }
 
 /// Both sides, ready to run.
-struct Sides {
+struct SimulatorSides {
     example: PathBuf,
     python: PathBuf,
     /// How long each measurement takes, as both sides read it.
     seconds: String,
 }
 
-impl Sides {
+impl SimulatorSides {
     fn prepare(seconds: String) -> anyhow::Result<Self> {
         Ok(Self { example: example()?, python: python(&folder(), "requirements.txt")?, seconds })
     }

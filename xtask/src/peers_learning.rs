@@ -37,7 +37,7 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     ensure!(rounds > 0, "--rounds is 0, must be at least 1");
     let seconds: f64 = flag(args, "--seconds").unwrap_or("3").parse().context("--seconds")?;
     succeed(&mut cargo(&BUILD))?;
-    let sides = Sides { python: python(&folder(), "requirements-learning.txt")? };
+    let sides = LearningSides { python: python(&folder(), "requirements-learning.txt")? };
     let (ours, peers) = sides.by_turns(rounds, |_| ["updates".to_owned(), seconds.to_string()])?;
     let mut lines = update_lines(&ours, &peers)?;
     let (ours, peers) = sides.by_turns(SEEDS, |seed| ["curve".to_owned(), seed.to_string()])?;
@@ -52,11 +52,11 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
 }
 
 /// Both sides, ready to run.
-struct Sides {
+struct LearningSides {
     python: PathBuf,
 }
 
-impl Sides {
+impl LearningSides {
     /// What both sides report, called in turn with the arguments of each round from 1.
     fn by_turns(
         &self,

@@ -33,7 +33,7 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     let seeds: u64 = flag(args, "--option-seeds").unwrap_or("1").parse().context("--option-seeds")?;
     ensure!(seeds > 0, "--option-seeds is 0, must be at least 1");
     let threads: u32 = flag(args, "--peer-threads").unwrap_or("1").parse().context("--peer-threads")?;
-    let sides = Sides {
+    let sides = OptionSides {
         python: python(&folder(), "requirements-learning.txt")?,
         plan: plan(flag(args, "--problem").unwrap_or("4"))?,
         limit,
@@ -61,7 +61,7 @@ fn plan(problem: &str) -> anyhow::Result<PathBuf> {
 }
 
 /// Both sides, ready to run.
-struct Sides {
+struct OptionSides {
     python: PathBuf,
     plan: PathBuf,
     /// Seconds that a side may take.
@@ -69,7 +69,7 @@ struct Sides {
     threads: u32,
 }
 
-impl Sides {
+impl OptionSides {
     fn compare(&self, seed: u64) -> anyhow::Result<[Value; 3]> {
         let (name, limit) = (seed.to_string(), self.limit.to_string());
         eprintln!("seed {seed}: the paper's settings on both sides, load {}", load());

@@ -1,9 +1,14 @@
 //! `cargo xtask tidy`: house rules that neither the compiler nor clippy checks.
 
 mod assets;
+mod code;
 mod docs;
 mod layers;
 mod licences;
+mod methods;
+mod names;
+mod one_loop;
+mod seams;
 mod sources;
 
 use std::fmt;
@@ -12,20 +17,20 @@ use crate::tree::Tree;
 
 /// A broken rule and where.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Problem {
+struct Finding {
     file: String,
     line: usize,
     message: String,
 }
 
-impl Problem {
+impl Finding {
     /// A problem in line `line` (from 1) of `file`.
     fn new(file: &str, line: usize, message: impl Into<String>) -> Self {
         Self { file: file.to_owned(), line, message: message.into() }
     }
 }
 
-impl fmt::Display for Problem {
+impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}: {}", self.file, self.line, self.message)
     }
@@ -43,6 +48,10 @@ pub(crate) fn run() -> anyhow::Result<u8> {
     problems.extend(sources::check(&tree));
     problems.extend(docs::check(&tree));
     problems.extend(assets::check(&tree));
+    problems.extend(one_loop::check(&tree));
+    problems.extend(methods::check(&tree));
+    problems.extend(names::check(&tree));
+    problems.extend(seams::check(&tree));
     problems.sort();
     for problem in &problems {
         println!("{problem}");

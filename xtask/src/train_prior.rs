@@ -30,7 +30,7 @@ fn calls(args: &[String]) -> Vec<Vec<String>> {
             call.extend(["--robot".to_owned(), robot.to_owned()]);
         }
         if flag(args, "--out").is_none() {
-            call.extend(["--out".to_owned(), format!("assets/models/prior-{robot}.safetensors")]);
+            call.extend(["--out".to_owned(), format!("crates/sharp-drive/assets/prior-{robot}.safetensors")]);
         }
         call.extend_from_slice(args);
         call
@@ -48,8 +48,8 @@ mod tests {
         assert_eq!(
             words(calls(&["--seed=2".to_owned()])),
             [
-                "prior train --robot husky --out assets/models/prior-husky.safetensors --seed=2",
-                "prior train --robot limo --out assets/models/prior-limo.safetensors --seed=2",
+                "prior train --robot husky --out crates/sharp-drive/assets/prior-husky.safetensors --seed=2",
+                "prior train --robot limo --out crates/sharp-drive/assets/prior-limo.safetensors --seed=2",
             ]
         );
         let args = ["--robot", "limo", "--out", "here"].map(String::from);

@@ -5,6 +5,8 @@
 //! others. [`Rrt`] and [`Sac`] are the paper's baselines, [`Track`] and [`Mpc`] what an engineer would use,
 //! [`Composed`] is SHARP.
 
+pub mod conformance;
+
 mod baselines;
 mod contender;
 

@@ -21,7 +21,8 @@ pub(crate) struct Cli {
     /// Print one JSON object on stdout instead of text.
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// Root of all randomness: equal seeds give equal bytes.
+    /// Root of all randomness: equal seeds give equal bytes, from equal libraries. The default library keeps what
+    /// earlier solves learnt, so a second solve may differ; --library none starts from nothing.
     #[arg(long, global = true, default_value_t = 1, value_name = "N")]
     pub(crate) seed: u64,
     /// Worker threads; the result does not depend on it [default: all cores].

@@ -16,7 +16,6 @@ mod outcome;
 mod pictures;
 mod pipeline;
 mod progress;
-mod render;
 mod report;
 mod tensorboard;
 

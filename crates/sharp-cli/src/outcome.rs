@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
+use sharp_draw::PngError;
 use sharp_maps::MapError;
 use sharp_plan::{FileError, SolveError};
 use sharp_sim::{NoiseError, RobotError};
@@ -106,8 +107,14 @@ impl From<SolveError> for Failure {
     fn from(error: SolveError) -> Self {
         match error {
             SolveError::File(error) => error.into(),
-            error => Self::new("NO_FREE_SPACE", error.to_string()),
+            error => Self::new("NO_FREE_SPACE", error),
         }
+    }
+}
+
+impl From<PngError> for Failure {
+    fn from(error: PngError) -> Self {
+        Self::new("FAILED", error)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use sharp_draw::{Scene, Trajectory, svg_to_png};
 use sharp_drive::EpisodeEnd;
 use sharp_plan::{Abstraction, Execution, Plan, Query, write_atomic};
 use sharp_rbvd::StateAbstraction;
@@ -9,7 +10,6 @@ use sharp_regions::Heatmap;
 use sharp_space::{OccupancyGrid, Point, Region};
 
 use crate::outcome::Failure;
-use crate::render::{Drive, Scene, svg_to_png};
 
 /// Longer side of the PNG beside each SVG, pixels.
 const PNG_SIDE_PX: u32 = 1200;
@@ -23,7 +23,7 @@ pub(crate) fn write(folder: &Path, name: &str, svg: &str) -> Result<(), Failure>
 
 /// The heat map of criticality with the outlines of the regions made from it.
 pub(crate) fn regions(grid: &OccupancyGrid, heatmap: &Heatmap, regions: &[Region]) -> String {
-    Scene::new(grid).heat_map(heatmap.values()).regions(regions).to_svg()
+    Scene::new(grid).heat_map(heatmap.values(), "criticality").regions(regions).to_svg()
 }
 
 /// The regions of all states.
@@ -62,16 +62,16 @@ pub(crate) fn plan(plan: &Plan, query: &Query, executions: &[Execution]) -> Stri
         .map(|planned| planned.option.guide.poses().iter().map(|pose| pose.position).collect())
         .collect();
     let targets: Vec<Point> = steps.iter().map(|planned| planned.option.target.center()).collect();
-    let drives: Vec<Drive> = executions
+    let trajectories: Vec<Trajectory> = executions
         .iter()
-        .map(|run| Drive { poses: run.record.trace.clone(), failed: run.end != EpisodeEnd::Reached })
+        .map(|run| Trajectory { poses: run.record.trace.clone(), failed: run.end != EpisodeEnd::Reached })
         .collect();
     Scene::new(&plan.world.grid)
         .states(&|cell| rbvd.state_of(cell).map(|state| state.0))
         .faded()
         .endpoints(&targets, plan.world.robot.goal_tolerance_m)
         .guides(&guides)
-        .drives(&drives, plan.world.robot.footprint)
+        .trajectories(&trajectories, plan.world.robot.footprint)
         .problem(query.start, query.goal)
         .to_svg()
 }

@@ -58,12 +58,15 @@ pub(crate) struct LegReport {
     /// On the states in which the leg before arrives.
     pub(crate) on_arrival: Verified,
     pub(crate) length_m: f64,
+    /// Mean simulated time of a success when entered the way the option before arrives, seconds.
+    pub(crate) time_s: Option<f64>,
+    /// What the search counts: time per success, and the price of failures, seconds.
     pub(crate) cost_s: f64,
 }
 
 impl LegReport {
     fn new(planned: &PlannedOption, failure_cost_s: f64) -> Self {
-        let PlannedOption { option: leg, learnt, reused, on_arrival, .. } = planned;
+        let PlannedOption { option: leg, learnt, reused, on_arrival, arrival_time_s } = planned;
         Self {
             option: leg.id.to_string(),
             from: leg.from.0,
@@ -76,6 +79,7 @@ impl LegReport {
             verified: learnt.estimate.count.into(),
             on_arrival: (*on_arrival).into(),
             length_m: leg.guide.length_m(),
+            time_s: arrival_time_s.is_finite().then_some(*arrival_time_s),
             cost_s: learnt.cost_s(failure_cost_s),
         }
     }
@@ -147,6 +151,8 @@ pub(crate) struct SolveReport {
     pub(crate) cost_update: &'static str,
     pub(crate) noise: String,
     pub(crate) seed: u64,
+    /// The folder of the library, or "none".
+    pub(crate) library: String,
     pub(crate) map: MapReport,
     pub(crate) regions: String,
     pub(crate) states: usize,

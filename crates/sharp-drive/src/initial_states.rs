@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 use rand_distr::{Distribution, Normal};
-use sharp_guide::GuidedOption;
+use sharp_guide::{GuidedOption, LegId};
 use sharp_sim::{NoiseModel, RobotState, SimulatorKind};
 use sharp_space::{Heading, Point, Pose, Seed, Stream, Vector, trig};
 
@@ -46,6 +46,17 @@ impl InitialStates {
     #[must_use]
     pub fn exactly(state: RobotState) -> Self {
         Self { spread: vec![state], arrivals: vec![] }
+    }
+
+    /// Where `option` begins in a plan from `start`: there, or at `count` states spread over its initiation set.
+    #[must_use]
+    pub fn of_option(world: &World, option: &GuidedOption, start: Pose, count: usize, seed: Seed) -> Self {
+        match option.id {
+            LegId::First(_) | LegId::Direct => Self::exactly(RobotState::at_rest(start)),
+            LegId::Option(_) | LegId::Last(..) => {
+                Self::spread(world, option, &StateSpread::default(), count, seed)
+            }
+        }
     }
 
     /// `count` states spread over the initiation set of `option`, in each of which a slow follower without noise

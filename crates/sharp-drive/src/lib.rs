@@ -7,7 +7,6 @@
 //! ([`MonteCarlo`]), learning ([`OptionTask`]) and execution all use these, so that what is predicted is what runs.
 //!
 //! ```
-//! use std::sync::Arc;
 //! use sharp_drive::{Episode, EpisodeEnd, EpisodeRules, Follower, RouteController, Wall, World};
 //! use sharp_guide::GuidePath;
 //! use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
@@ -15,13 +14,15 @@
 //!
 //! let grid = OccupancyGrid::from_ascii(0.5, &["...................."; 8].join("\n")).unwrap();
 //! let world = World::new(grid, RobotModel::husky());
-//! let route = GuidePath::new((0..=30).map(|i| Pose::new(2.0 + 0.2 * f64::from(i), 2.0, 0.0)).collect(), 0.25).unwrap();
+//! let poses = (0..=30).map(|i| Pose::new(2.0 + 0.2 * f64::from(i), 2.0, 0.0)).collect();
+//! let route = GuidePath::new(poses, 0.25).unwrap();
 //!
-//! let simulator = world.simulator(SimulatorKind::Kinematic);
-//! let vehicle = world.vehicle(&*simulator, &NoiseModel::none(), true);
-//! let mut episode = Episode::new(vehicle, EpisodeRules::default());
-//! episode.begin(RobotState::at_rest(route.start()), Seed(1), 0);
-//! let mut controller = RouteController::new(&world, route, Box::new(Follower::cautious(&world.robot)), &episode);
+//! let (simulator, noise) = (world.simulator(SimulatorKind::Kinematic), NoiseModel::nominal());
+//! let mut episode = Episode::new(world.vehicle(&*simulator, &noise, true), EpisodeRules::default());
+//! let start = RobotState::at_rest(route.start());
+//! episode.begin(start, Seed(1), 0);
+//! let policy = Box::new(Follower::cautious(&world.robot));
+//! let mut controller = RouteController::new(&world, route, policy, start, &noise);
 //! assert_eq!(episode.drive(&mut controller, &Wall::silent()), EpisodeEnd::Reached);
 //! ```
 

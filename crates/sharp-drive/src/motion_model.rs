@@ -5,6 +5,7 @@
 
 use sharp_sim::{
     ActionSettings, Drive, RobotModel, RobotState, STEER_PER_DRIFT_S, WaypointController, WheelCommand,
+    approach,
 };
 use sharp_space::{Heading, Pose, Vector, trig};
 
@@ -154,10 +155,6 @@ struct Response {
 /// Time steps of an action.
 fn steps() -> usize {
     (ActionSettings::default().action_s / MODEL_DT_S).round() as usize
-}
-
-fn approach(value: f64, target: f64, step: f64) -> f64 {
-    value + (target - value).clamp(-step, step)
 }
 
 #[cfg(test)]

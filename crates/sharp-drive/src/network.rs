@@ -76,7 +76,6 @@ pub enum PolicyInterface {
         /// What a full action changes.
         correction: Correction,
         /// What the network is told.
-        #[serde(rename = "expectation")]
         context: PolicyContext,
     },
     /// The paper's: absolute configuration and vector to the nearest guide point; the action is the

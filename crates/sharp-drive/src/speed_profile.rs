@@ -24,7 +24,6 @@ pub struct SpeedProfile {
     /// Slowest, as a share of the robot's top speed.
     pub slow: f64,
     /// Clearance at the robot's sides at which it drives slowest, and from which on it cruises, metres.
-    #[serde(rename = "room_m")]
     pub clearance_m: [f64; 2],
     /// Turn of the path over the distance looked ahead at which the robot drives slowest, radians.
     pub turn_rad: f64,
@@ -77,7 +76,6 @@ pub struct ProfiledFollower {
     /// How fast.
     pub speed: SpeedProfile,
     /// Share of the estimated drift that the direction compensates, 0 to 1.
-    #[serde(rename = "trim")]
     pub drift_compensation: f64,
 }
 

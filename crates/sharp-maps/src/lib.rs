@@ -6,12 +6,18 @@
 //! ROS's map saver would. A broken file gives a [`MapError`] that names the file, the field, its value and
 //! what is allowed. Sizes are checked before memory is spent on them. [`generate`] draws random floor plans.
 //!
+//! The default feature `files` holds everything but the generator. Whoever needs generated plans only leaves it
+//! out, and with it the image decoder and the YAML parser.
+//!
 //! ```
+//! # #[cfg(feature = "files")]
+//! # {
 //! use sharp_maps::{LoadOptions, load};
 //!
 //! let map = load("a", &LoadOptions::default()).unwrap();
 //! assert_eq!(map.grid.frame().width_m(), 15.0);
 //! assert_eq!(map.problems.len(), 5);
+//! # }
 //! ```
 
 mod generate;

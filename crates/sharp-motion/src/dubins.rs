@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use sharp_space::Pose;
+use sharp_space::{Pose, trig};
 
 use crate::maneuver::Primitive;
 
@@ -13,7 +13,7 @@ use crate::maneuver::Primitive;
 pub(crate) fn shortest(from: Pose, to: Pose, radius_m: f64) -> [Primitive; 3] {
     debug_assert!(radius_m > 0.0, "turning radius is {radius_m} m, must be positive");
     let local = from.to_local(to.position) / radius_m;
-    let bearing = local.y.atan2(local.x);
+    let bearing = trig::atan2(local.y, local.x);
     let problem = DubinsProblem::new(
         local.norm(),
         positive_angle(-bearing),
@@ -61,8 +61,8 @@ struct DubinsProblem {
 
 impl DubinsProblem {
     fn new(d: f64, alpha: f64, beta: f64) -> Self {
-        let ((sin_a, cos_a), (sin_b, cos_b)) = (alpha.sin_cos(), beta.sin_cos());
-        Self { d, alpha, beta, sin_a, sin_b, cos_a, cos_b, cos_ab: (alpha - beta).cos() }
+        let ((sin_a, cos_a), (sin_b, cos_b)) = (trig::sin_cos(alpha), trig::sin_cos(beta));
+        Self { d, alpha, beta, sin_a, sin_b, cos_a, cos_b, cos_ab: trig::cos(alpha - beta) }
     }
 
     fn lsl(&self) -> Option<DubinsWord> {
@@ -91,7 +91,7 @@ impl DubinsProblem {
         let x = self.d + self.sin_a + self.sin_b;
         let squared = self.d * self.d - 2.0 + 2.0 * self.cos_ab + 2.0 * self.d * (self.sin_a + self.sin_b);
         let p = (squared >= 0.0).then(|| squared.sqrt())?;
-        let angle = (-self.cos_a - self.cos_b).atan2(x) - (-2.0_f64).atan2(p);
+        let angle = trig::atan2(-self.cos_a - self.cos_b, x) - trig::atan2(-2.0, p);
         Some(word(
             [LEFT, STRAIGHT, RIGHT],
             positive_angle(angle - self.alpha),
@@ -104,7 +104,7 @@ impl DubinsProblem {
         let x = self.d - self.sin_a - self.sin_b;
         let squared = self.d * self.d - 2.0 + 2.0 * self.cos_ab - 2.0 * self.d * (self.sin_a + self.sin_b);
         let p = (squared >= 0.0).then(|| squared.sqrt())?;
-        let angle = (self.cos_a + self.cos_b).atan2(x) - 2.0_f64.atan2(p);
+        let angle = trig::atan2(self.cos_a + self.cos_b, x) - trig::atan2(2.0, p);
         Some(word(
             [RIGHT, STRAIGHT, LEFT],
             positive_angle(self.alpha - angle),
@@ -116,14 +116,14 @@ impl DubinsProblem {
     fn rlr(&self) -> Option<DubinsWord> {
         let x = self.d - self.sin_a + self.sin_b;
         let p = self.middle_turn(self.sin_a - self.sin_b)?;
-        let t = positive_angle(self.alpha - (self.cos_a - self.cos_b).atan2(x) + p / 2.0);
+        let t = positive_angle(self.alpha - trig::atan2(self.cos_a - self.cos_b, x) + p / 2.0);
         Some(word([RIGHT, LEFT, RIGHT], t, p, positive_angle(self.alpha - self.beta - t + p)))
     }
 
     fn lrl(&self) -> Option<DubinsWord> {
         let x = self.d + self.sin_a - self.sin_b;
         let p = self.middle_turn(self.sin_b - self.sin_a)?;
-        let t = positive_angle(-self.alpha - (self.cos_a - self.cos_b).atan2(x) + p / 2.0);
+        let t = positive_angle(-self.alpha - trig::atan2(self.cos_a - self.cos_b, x) + p / 2.0);
         Some(word([LEFT, RIGHT, LEFT], t, p, positive_angle(self.beta - self.alpha - t + p)))
     }
 
@@ -132,14 +132,14 @@ impl DubinsProblem {
     /// If the straight has no length, its direction is rounding noise. Then the last arc makes the whole
     /// turn.
     fn straight(&self, x: f64, y: f64) -> (f64, f64) {
-        let p = x.hypot(y);
-        if p > 1e-7 { (p, y.atan2(x)) } else { (0.0, self.alpha) }
+        let p = trig::hypot(x, y);
+        if p > 1e-7 { (p, trig::atan2(y, x)) } else { (0.0, self.alpha) }
     }
 
     /// The long turn between two equal ones. `None` if the outer circles are too far apart.
     fn middle_turn(&self, sin_difference: f64) -> Option<f64> {
         let cos = (6.0 - self.d * self.d + 2.0 * self.cos_ab + 2.0 * self.d * sin_difference) / 8.0;
-        (cos.abs() <= 1.0).then(|| positive_angle(TAU - cos.acos()))
+        (cos.abs() <= 1.0).then(|| positive_angle(TAU - trig::acos(cos)))
     }
 }
 

@@ -73,7 +73,7 @@ struct TreeNode {
     edge: Maneuver,
 }
 
-/// A tree of poses. TreeNode 0 is the root.
+/// A tree of poses. Node 0 is the root.
 pub(crate) struct PoseTree {
     nodes: Vec<TreeNode>,
     index: Nearest,

@@ -22,7 +22,7 @@ use crate::files::{self, FileError};
 use crate::learn::LearntPolicy;
 
 /// Raised whenever the files change their meaning.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
 
 /// A policy as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,13 +30,10 @@ pub(crate) enum PolicyFile {
     /// A follower needs nothing but its settings.
     Follower(Follower),
     /// Nor does one with a speed profile.
-    #[serde(rename = "Paced")]
     Profiled(ProfiledFollower),
     /// A network and the file of its weights.
-    #[serde(rename = "Learnt")]
     Network {
         /// What it sees and does.
-        #[serde(rename = "form")]
         interface: PolicyInterface,
         /// File name of the weights, in the same folder.
         weights: String,

@@ -171,6 +171,11 @@ impl Method {
         }
     }
 
+    /// The method of a plan that is read from a file: what running it takes, and no learner of its own.
+    pub(crate) fn of_plan(name: String, search: SearchSettings, failure_cost_s: f64) -> Self {
+        Self { name, guides: search.guide.to_planner(), search, failure_cost_s, ..Self::prior() }
+    }
+
     /// The method called `name`, one of `fast`, `paper` and `prior`.
     #[must_use]
     pub fn by_name(name: &str) -> Option<Self> {

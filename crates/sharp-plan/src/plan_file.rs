@@ -15,7 +15,7 @@ use crate::abstraction::Abstraction;
 use crate::files::{self, FileError};
 use crate::learn::LearntPolicy;
 use crate::library::{FORMAT, PolicyFile};
-use crate::method::Method;
+use crate::method::{Method, SearchSettings};
 use crate::query::Query;
 use crate::verify::{PlannedOption, Solution};
 
@@ -118,15 +118,6 @@ pub struct Plan {
     pub solution: Solution,
 }
 
-/// The word for a method in plan files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum LearningWord {
-    Fast,
-    Prior,
-    Paper,
-}
-
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlanFile {
@@ -134,15 +125,15 @@ struct PlanFile {
     map: String,
     robot: RobotModel,
     noise: NoiseModel,
-    learning: LearningWord,
-    cost_update: bool,
+    method: String,
+    search: SearchSettings,
     failure_cost_s: f64,
     seed: Seed,
     start: Pose,
     goal: Pose,
     predicted: SuccessCount,
     predicted_time_s: f64,
-    legs: Vec<StepFile>,
+    steps: Vec<StepFile>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -154,8 +145,9 @@ struct StepFile {
     guide: GuidePath,
     policy: PolicyFile,
     verified: SuccessCount,
-    on_arrival: SuccessCount,
     mean_time_s: f64,
+    on_arrival: SuccessCount,
+    arrival_time_s: f64,
     env_steps: u64,
     gradient_steps: u64,
     reused: bool,
@@ -174,19 +166,15 @@ impl Plan {
             map: map_hash(&self.world.grid),
             robot: (*self.world.robot).clone(),
             noise: self.noise.clone(),
-            learning: match self.method.name.as_str() {
-                "prior" => LearningWord::Prior,
-                "paper" => LearningWord::Paper,
-                _ => LearningWord::Fast,
-            },
-            cost_update: self.method.search.cost_update,
+            method: self.method.name.clone(),
+            search: self.method.search,
             failure_cost_s: self.method.failure_cost_s,
             seed: self.seed,
             start: self.solution.query.start,
             goal: self.solution.query.goal,
             predicted: self.solution.predicted,
             predicted_time_s: self.solution.predicted_time_s,
-            legs: steps.collect::<Result<_, _>>()?,
+            steps: steps.collect::<Result<_, _>>()?,
         };
         files::write_ron(&folder.join(PLAN_FILE), &file)
     }
@@ -201,20 +189,13 @@ impl Plan {
         let map = map_hash(&grid);
         check_header(&path, (file.format, &file.map), &map)?;
         let abstraction = AbstractionFile::load(&folder.join(ABSTRACTION_FILE), &map)?.abstraction();
-        let word = match file.learning {
-            LearningWord::Fast => "fast",
-            LearningWord::Prior => "prior",
-            LearningWord::Paper => "paper",
-        };
-        let mut method = Method::by_name(word).expect("its own word");
-        method.search.cost_update = file.cost_update;
-        method.failure_cost_s = file.failure_cost_s;
+        let method = Method::of_plan(file.method, file.search, file.failure_cost_s);
         let space = abstraction.space(method.search.allowed);
         let goal = Goal { point: file.goal.position, radius_m: file.robot.goal_tolerance_m };
-        let steps = file.legs.into_iter().map(|step| planned_option(step, folder, &space, goal));
+        let steps = file.steps.into_iter().map(|step| planned_option(step, folder, &space, goal));
         let steps = steps.collect::<Result<Vec<_>, _>>()?;
         if steps.is_empty() {
-            return Err(FileError::content(&path, "legs is empty, expected at least one"));
+            return Err(FileError::content(&path, "steps is empty, expected at least one"));
         }
         let query = Query { start: file.start, goal: file.goal };
         let (predicted, predicted_time_s) = (file.predicted, file.predicted_time_s);
@@ -230,7 +211,7 @@ impl Plan {
 }
 
 fn step_file(step: &PlannedOption, folder: &Path) -> Result<StepFile, FileError> {
-    let PlannedOption { option, learnt, reused, on_arrival, .. } = step;
+    let PlannedOption { option, learnt, reused, on_arrival, arrival_time_s } = step;
     Ok(StepFile {
         id: option.id,
         from: option.from,
@@ -238,8 +219,9 @@ fn step_file(step: &PlannedOption, folder: &Path) -> Result<StepFile, FileError>
         guide: option.guide.clone(),
         policy: PolicyFile::save(&learnt.policy, folder)?,
         verified: learnt.estimate.count,
-        on_arrival: *on_arrival,
         mean_time_s: learnt.estimate.mean_time_s,
+        on_arrival: *on_arrival,
+        arrival_time_s: *arrival_time_s,
         env_steps: learnt.env_steps,
         gradient_steps: learnt.gradient_steps,
         reused: *reused,
@@ -259,8 +241,13 @@ fn planned_option(
         gradient_steps: file.gradient_steps,
     };
     let option = GuidedOption::new(space, file.id, (file.from, file.to), file.guide, goal);
-    let (option, arrival_time_s) = (Arc::new(option), file.mean_time_s);
-    Ok(PlannedOption { option, learnt, reused: file.reused, on_arrival: file.on_arrival, arrival_time_s })
+    Ok(PlannedOption {
+        option: Arc::new(option),
+        learnt,
+        reused: file.reused,
+        on_arrival: file.on_arrival,
+        arrival_time_s: file.arrival_time_s,
+    })
 }
 
 #[cfg(test)]

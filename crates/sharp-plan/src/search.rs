@@ -13,7 +13,7 @@ use sharp_drive::World;
 use sharp_guide::{Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace};
 use sharp_options::OptionId;
 use sharp_rbvd::{StateAbstraction, StateId};
-use sharp_space::{Cell, Point, Seed};
+use sharp_space::{Cell, Point, Seed, trig};
 
 use crate::abstraction::Abstraction;
 use crate::method::{Method, SearchSettings};
@@ -195,7 +195,7 @@ impl<'a> Search<'a> {
             return self.settings.smooth_turn_rad;
         }
         let run_up_m = (clearance_m - robot.footprint.inscribed_radius_m()).max(0.0);
-        (2.0 * (run_up_m / robot.min_turning_radius_m()).atan()).min(CAR_TURN_MAX_RAD)
+        (2.0 * trig::atan(run_up_m / robot.min_turning_radius_m())).min(CAR_TURN_MAX_RAD)
     }
 
     fn guide(&self, id: LegId) -> Result<Arc<GuidedOption>, NoGuide> {

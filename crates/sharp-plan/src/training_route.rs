@@ -8,11 +8,11 @@ use std::sync::Arc;
 use rand::RngExt;
 use sharp_drive::{
     Driver, InitialStates, Link, MonteCarlo, OptionPolicy, PolicyContext, PolicyInterface, Scenario,
-    ScenarioSource, StateSpread, SuccessEstimate, World, prior_interface,
+    ScenarioSource, SuccessEstimate, World, prior_interface,
 };
-use sharp_guide::{GuidedOption, LegId, ProgressReward};
+use sharp_guide::{GuidedOption, ProgressReward};
 use sharp_rl::{StopRule, TrainSettings};
-use sharp_sim::{NoiseModel, RobotState, SimulatorKind};
+use sharp_sim::{NoiseModel, SimulatorKind};
 use sharp_space::{Seed, Stream};
 
 use crate::abstraction::Abstraction;
@@ -82,19 +82,13 @@ pub fn training_routes(
     let route = |query: &Query| {
         let mut search = Search::new(world, abstraction, &method, *query, [], seed).ok()?;
         let options = search.plan(&|_| None, &())?;
-        let states = options.iter().map(|option| states(world, option, query, seed)).collect();
+        let states = options
+            .iter()
+            .map(|option| InitialStates::of_option(world, option, query.start, STATE_POOL, seed))
+            .collect();
         Some(TrainingRoute { world: world.clone(), options, states })
     };
     queries.iter().filter_map(route).collect()
-}
-
-fn states(world: &World, option: &GuidedOption, query: &Query, seed: Seed) -> InitialStates {
-    match option.id {
-        LegId::First(_) | LegId::Direct => InitialStates::exactly(RobotState::at_rest(query.start)),
-        LegId::Option(_) | LegId::Last(..) => {
-            InitialStates::spread(world, option, &StateSpread::default(), STATE_POOL, seed)
-        }
-    }
 }
 
 /// Parts of routes under noises of many strengths, at every degree of caution.
@@ -102,17 +96,24 @@ fn states(world: &World, option: &GuidedOption, query: &Query, seed: Seed) -> In
 pub struct RouteScenarios {
     routes: Arc<Vec<TrainingRoute>>,
     noises: Arc<Vec<NoiseModel>>,
+    simulator: SimulatorKind,
 }
 
 impl RouteScenarios {
-    /// Parts of `routes` under `noises`.
+    /// Parts of `routes` under `noises`, in the kinematic simulator.
     ///
     /// # Panics
     /// If there are no routes or no noises.
     #[must_use]
     pub fn new(routes: Arc<Vec<TrainingRoute>>, noises: Arc<Vec<NoiseModel>>) -> Self {
         assert!(!routes.is_empty() && !noises.is_empty(), "training needs routes and noises");
-        Self { routes, noises }
+        Self { routes, noises, simulator: SimulatorKind::Kinematic }
+    }
+
+    /// The same in another simulator.
+    #[must_use]
+    pub fn with_simulator(self, simulator: SimulatorKind) -> Self {
+        Self { simulator, ..self }
     }
 }
 
@@ -129,7 +130,7 @@ impl ScenarioSource for RouteScenarios {
         let reward = ProgressReward { contact, success: 1.0, stray: 0.0, ..ProgressReward::default() };
         let link = |index: usize| Link::new(Arc::clone(&options[index]), options.get(index + 1).cloned());
         Scenario {
-            simulator: world.simulator(SimulatorKind::Kinematic),
+            simulator: world.simulator(self.simulator),
             interface: interface(world, PolicyContext::new(&noise, caution as f32)),
             noise,
             links: (first..=last).map(link).collect(),

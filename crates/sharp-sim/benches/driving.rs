@@ -12,7 +12,7 @@ use sharp_sim::{
     ActionSettings, AnySim, NoiseModel, ObstacleMap, RobotModel, RobotState, Simulator, SimulatorKind,
     Vehicle, WheelCommand,
 };
-use sharp_space::{CollisionChecker, OccupancyGrid, Point, Pose, Seed, Stream};
+use sharp_space::{OccupancyGrid, Point, Pose, Seed, Stream};
 
 #[path = "support/maps.rs"]
 mod maps;
@@ -117,8 +117,8 @@ fn forks(c: &mut Criterion) {
     for map in ["grid_15", "grid_75", "boxes_10000"] {
         let grid = grid(map);
         let footprint = RobotModel::husky().footprint;
-        c.bench_function(&format!("obstacles/{map}"), |b| {
-            b.iter(|| black_box(ObstacleMap::new(&grid, footprint)))
+        c.bench_function(&format!("obstacle_map/{map}"), |b| {
+            b.iter(|| black_box(ObstacleMap::new(&grid, footprint)));
         });
         for kind in KINDS {
             let mut sim = simulator(kind, &grid, &RobotModel::husky());

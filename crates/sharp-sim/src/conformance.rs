@@ -27,9 +27,9 @@ pub enum SimulatorViolation {
     #[error("after a reset to {expected:?} the state is {found:?}")]
     Reset {
         /// The state asked for.
-        expected: RobotState,
+        expected: Box<RobotState>,
         /// The state found.
-        found: RobotState,
+        found: Box<RobotState>,
     },
     /// A drive after a reset differs from the same drive before it.
     #[error("step {step} after a reset differs from the same step before: the past was not forgotten")]
@@ -115,7 +115,7 @@ fn ahead(speed_mps: f64) -> WheelCommand {
 
 /// A changing command, number `step` of a drive in bends that meets the wall.
 fn bends(step: usize) -> WheelCommand {
-    let turn = if step / 40 % 2 == 0 { 0.6 } else { -0.8 };
+    let turn = if (step / 40).is_multiple_of(2) { 0.6 } else { -0.8 };
     WheelCommand::Twist { speed_mps: 0.8, yaw_rate_radps: turn }
 }
 
@@ -139,7 +139,10 @@ fn step(
 fn reset(sim: &mut impl Simulator, expected: RobotState) -> Result<(), SimulatorViolation> {
     sim.reset(expected);
     let found = *sim.state();
-    if found == expected { Ok(()) } else { Err(SimulatorViolation::Reset { expected, found }) }
+    if found == expected {
+        return Ok(());
+    }
+    Err(SimulatorViolation::Reset { expected: Box::new(expected), found: Box::new(found) })
 }
 
 fn check_reset(sim: &mut impl Simulator) -> Result<(), SimulatorViolation> {

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use std::sync::Arc;
-//! use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, RobotModel, RobotState, Vehicle, ObstacleMap};
+//! use sharp_sim::{ActionSettings, KinematicSim, NoiseModel, ObstacleMap, RobotModel, RobotState, Vehicle};
 //! use sharp_space::{OccupancyGrid, Point, Pose, Seed};
 //!
 //! let grid = OccupancyGrid::from_ascii(1.0, "......\n......\n......").unwrap();
@@ -58,3 +58,4 @@ pub use robot::{Drive, RobotError, RobotModel};
 pub use simulator::{AnySim, ForkSimulator, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
 pub use state::{RobotState, WheelCommand};
 pub use vehicle::{ActionReport, ActionSettings, Vehicle, VehicleSnapshot};
+pub use wheels::approach;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sharp_space::{
-    DistanceField, Footprint, FootprintChecker, GridFrame, OccupancyGrid, Pose, RobotGeometry, Vector,
+    DistanceField, Footprint, FootprintChecker, GridFrame, OccupancyGrid, Pose, RobotGeometry, Vector, trig,
 };
 
 use crate::convert::Obstacles;
@@ -110,7 +110,7 @@ impl DiscCover {
         let third_m = footprint.half_length_m() / 3.0;
         Self {
             offsets_m: [-2.0 * third_m, 0.0, 2.0 * third_m],
-            radius_m: third_m.hypot(footprint.half_width_m()),
+            radius_m: trig::hypot(third_m, footprint.half_width_m()),
         }
     }
 }

@@ -18,7 +18,7 @@ use rapier3d::geometry::{
 };
 use rapier3d::math::{Pose as EnginePose, Rotation, Vector as EngineVector};
 use rapier3d::pipeline::PhysicsPipeline;
-use sharp_space::{Heading, Pose, Vector};
+use sharp_space::{Heading, Pose, Vector, trig};
 
 use crate::contact::ContactGuard;
 use crate::obstacle_map::ObstacleMap;
@@ -82,7 +82,7 @@ impl RigidSim {
     fn read_state(&mut self) {
         let body = &self.engine.bodies[self.engine.chassis];
         let ahead = *body.rotation() * EngineVector::X;
-        let turn = Heading::new(f64::from(ahead.y).atan2(f64::from(ahead.x)));
+        let turn = Heading::of(Vector::new(f64::from(ahead.x), f64::from(ahead.y)));
         let origin = self.map.frame().origin;
         let place = body.translation();
         let heading = Heading::new(origin.heading.radians() + turn.radians());
@@ -195,10 +195,13 @@ impl RigidBodies {
             }
             Drive::Ackermann { wheelbase_m, .. } => {
                 // All wheels roll around one point on the line of the rear axle.
-                let curvature = state.steer_rad.tan() / wheelbase_m;
+                let curvature = trig::tan(state.steer_rad) / wheelbase_m;
                 let ahead = 1.0 - curvature * contact.y;
                 let left = curvature * (contact.x + wheelbase_m / 2.0);
-                WheelRoll { speed_mps: speed_mps * ahead.hypot(left), angle_rad: left.atan2(ahead) }
+                WheelRoll {
+                    speed_mps: speed_mps * trig::hypot(ahead, left),
+                    angle_rad: trig::atan2(left, ahead),
+                }
             }
         }
     }
@@ -215,7 +218,7 @@ struct WheelRoll {
 impl WheelRoll {
     /// The axis that it turns around, in the chassis' frame.
     fn axis(&self) -> EngineVector {
-        let (sin, cos) = self.angle_rad.sin_cos();
+        let (sin, cos) = trig::sin_cos(self.angle_rad);
         EngineVector::new(-sin as f32, cos as f32, 0.0)
     }
 }

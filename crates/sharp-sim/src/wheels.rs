@@ -134,6 +134,7 @@ fn steer_for(speed_mps: f64, yaw_rate_radps: f64, wheelbase_m: f64) -> f64 {
 }
 
 /// `from`, moved towards `to` by at most `step`.
-fn approach(from: f64, to: f64, step: f64) -> f64 {
+#[must_use]
+pub fn approach(from: f64, to: f64, step: f64) -> f64 {
     from + (to - from).clamp(-step, step)
 }

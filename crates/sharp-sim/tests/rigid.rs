@@ -9,7 +9,7 @@ use sharp_sim::{
     ActionSettings, NoiseModel, ObstacleMap, PlanarSim, RigidSim, RobotModel, RobotState, Simulator, Vehicle,
     WheelCommand,
 };
-use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Point, Pose, Seed};
+use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Point, Pose, Seed, trig};
 
 const DT_S: f64 = 1.0 / 60.0;
 
@@ -130,7 +130,7 @@ fn a_robot_pushes_a_wall_without_climbing_it_and_backs_out() {
 fn equal_seeds_and_forks_give_equal_bits() {
     for robot in [RobotModel::husky(), RobotModel::limo()] {
         let clutter = obstacles(&robot, |x, y| {
-            (x.rem_euclid(2.5) < 0.4 && y.rem_euclid(2.5) < 0.4) && x.hypot(y) > 1.0
+            (x.rem_euclid(2.5) < 0.4 && y.rem_euclid(2.5) < 0.4) && trig::hypot(x, y) > 1.0
         });
         let sim = RigidSim::new(clutter, &robot);
         let settings = ActionSettings { stop_at_contact: false, ..ActionSettings::default() };

@@ -154,13 +154,14 @@ impl LowerEnvelope {
 mod tests {
     use super::*;
     use crate::pose::Pose;
+    use crate::trig;
 
     fn brute_force(frame: &GridFrame, mask: &[bool], cell: Cell) -> f64 {
         let outside = [cell.col + 1, cell.row + 1, frame.width - cell.col, frame.height - cell.row];
         let border = outside.into_iter().min().unwrap_or(0) as f64;
         let inside = (0..frame.len()).filter(|&i| mask[i]).map(|i| {
             let other = frame.cell(i);
-            (cell.col as f64 - other.col as f64).hypot(cell.row as f64 - other.row as f64)
+            trig::hypot(cell.col as f64 - other.col as f64, cell.row as f64 - other.row as f64)
         });
         inside.fold(border, f64::min) * frame.resolution_m
     }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::pose::{Point, Pose, Vector};
+use crate::trig;
 
 /// Why an outline was refused.
 #[derive(Debug, Error, PartialEq)]
@@ -57,7 +58,7 @@ impl Footprint {
     /// Radius of the smallest disc around it: every pose with more clearance is free.
     #[must_use]
     pub fn circumscribed_radius_m(&self) -> f64 {
-        self.half_length_m.hypot(self.half_width_m)
+        trig::hypot(self.half_length_m, self.half_width_m)
     }
 
     /// The corners at `pose`, counter-clockwise from the front left.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::distance_field::DistanceField;
 use crate::grid::{Cell, GridFrame};
 use crate::pose::Point;
+use crate::trig;
 
 /// Names a region; equal to its position in the set Φ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -34,7 +35,7 @@ impl Region {
         let count = cells.len() as f64;
         let mean_col = cells.iter().map(|c| c.col as f64).sum::<f64>() / count;
         let mean_row = cells.iter().map(|c| c.row as f64).sum::<f64>() / count;
-        let off_center = |c: &Cell| (c.col as f64 - mean_col).hypot(c.row as f64 - mean_row);
+        let off_center = |c: &Cell| trig::hypot(c.col as f64 - mean_col, c.row as f64 - mean_row);
         let representative = *cells.iter().min_by(|a, b| {
             let by_clearance = clearance.at(**b).total_cmp(&clearance.at(**a));
             by_clearance.then(off_center(a).total_cmp(&off_center(b))).then(a.cmp(b))

@@ -1,11 +1,11 @@
 //! Every asset is listed with its origin.
 
-use super::{Problem, quoted};
+use super::{Finding, quoted};
 use crate::tree::Tree;
 
 /// Checks that the `README.md` of each `assets` folder, at the root and in crates, names every file below it,
 /// in backticks, by its path from there; a `*` in a name stands for anything but a slash.
-pub(super) fn check(tree: &Tree) -> Vec<Problem> {
+pub(super) fn check(tree: &Tree) -> Vec<Finding> {
     let mut problems = Vec::new();
     for (path, _) in tree.matching("", "") {
         let Some((folder, from_there)) = split(path) else { continue };
@@ -15,7 +15,7 @@ pub(super) fn check(tree: &Tree) -> Vec<Problem> {
         }
         let names = tree.files.get(&index).into_iter().flat_map(|text| text.lines().flat_map(quoted));
         if !names.into_iter().any(|name| matches(name, from_there)) {
-            problems.push(Problem::new(path, 1, format!("is not listed in {index}")));
+            problems.push(Finding::new(path, 1, format!("is not listed in {index}")));
         }
     }
     problems

@@ -1,6 +1,6 @@
 //! Documents name and link only files and tests that exist.
 
-use super::{Problem, quoted};
+use super::{Finding, quoted};
 use crate::tree::Tree;
 
 /// Documents that must exist.
@@ -13,18 +13,18 @@ const ENDINGS: [&str; 5] = [".md", ".rs", ".toml", ".ron", ".sh"];
 const FOLDERS: [&str; 6] = ["crates/", "docs/", "xtask/", "tests/", "assets/", ".ci/"];
 
 /// Checks the paths that all documents name and the tests that the map of the paper names.
-pub(super) fn check(tree: &Tree) -> Vec<Problem> {
+pub(super) fn check(tree: &Tree) -> Vec<Finding> {
     let mut problems = Vec::new();
     for path in REQUIRED.into_iter().filter(|path| !tree.files.contains_key(*path)) {
-        problems.push(Problem::new(path, 1, "is missing"));
+        problems.push(Finding::new(path, 1, "is missing"));
     }
     for (path, text) in tree.matching("", ".md") {
         for (i, line) in text.lines().enumerate() {
             for name in quoted(line).filter(|name| is_path(name) && !tree.has(name)) {
-                problems.push(Problem::new(path, i + 1, format!("names {name}, which does not exist")));
+                problems.push(Finding::new(path, i + 1, format!("names {name}, which does not exist")));
             }
             for link in links(line).filter(|link| !is_alive(tree, path, link)) {
-                problems.push(Problem::new(path, i + 1, format!("links {link}, which does not exist")));
+                problems.push(Finding::new(path, i + 1, format!("links {link}, which does not exist")));
             }
         }
     }
@@ -73,7 +73,7 @@ fn is_alive(tree: &Tree, document: &str, link: &str) -> bool {
 }
 
 /// Checks the column of each table of the paper's map whose heading holds the word "test".
-fn check_tests(tree: &Tree, text: &str) -> Vec<Problem> {
+fn check_tests(tree: &Tree, text: &str) -> Vec<Finding> {
     let mut problems = Vec::new();
     let mut column = None;
     for (i, line) in text.lines().enumerate() {
@@ -90,7 +90,7 @@ fn check_tests(tree: &Tree, text: &str) -> Vec<Problem> {
         };
         for test in cells.get(column).into_iter().flat_map(|cell| quoted(cell)).filter(|name| is_test(name)) {
             if !exists(tree, test) {
-                problems.push(Problem::new(PAPER_MAP, i + 1, format!("no test is called {test}")));
+                problems.push(Finding::new(PAPER_MAP, i + 1, format!("no test is called {test}")));
             }
         }
     }

@@ -5,11 +5,11 @@ use std::process::Stdio;
 
 use anyhow::{Context, ensure};
 
-use super::Problem;
+use super::Finding;
 use crate::process::cargo;
 
 /// Licences whose terms a binary of this project can meet; `deny.toml` holds the same list.
-const ALLOWED: [&str; 12] = [
+const ALLOWED: [&str; 13] = [
     "0BSD",
     "Apache-2.0",
     "Apache-2.0 WITH LLVM-exception",
@@ -19,6 +19,8 @@ const ALLOWED: [&str; 12] = [
     "CC0-1.0",
     "ISC",
     "MIT",
+    // Fonts only: they may be embedded in a program, and stay under it themselves.
+    "OFL-1.1",
     "Unicode-3.0",
     "Unlicense",
     "Zlib",
@@ -39,7 +41,7 @@ const EXCEPTIONS: [(&str, &str); 1] = [
 
 /// A package that a build for this machine contains.
 #[derive(Debug, PartialEq)]
-pub(super) struct Dependency {
+pub(super) struct LicensedPackage {
     name: String,
     licence: String,
 }
@@ -48,7 +50,7 @@ pub(super) struct Dependency {
 ///
 /// # Errors
 /// Returns an error if cargo cannot resolve the dependencies.
-pub(super) fn dependencies() -> anyhow::Result<Vec<Dependency>> {
+pub(super) fn dependencies() -> anyhow::Result<Vec<LicensedPackage>> {
     // Not `cargo metadata`: its graph holds packages of features that nobody asked for.
     let args = ["tree", "--workspace", "--edges", "normal,build", "--prefix", "none", "--format", "{p}\t{l}"];
     let output = cargo(&args).stderr(Stdio::inherit()).output().context("cannot start cargo tree")?;
@@ -57,26 +59,26 @@ pub(super) fn dependencies() -> anyhow::Result<Vec<Dependency>> {
 }
 
 /// Reads lines such as `name v1.2.3 (proc-macro)`, tab, licence; repeated packages end in `(*)`.
-fn parse(tree: &str) -> Vec<Dependency> {
+fn parse(tree: &str) -> Vec<LicensedPackage> {
     let lines: BTreeSet<&str> = tree.lines().map(|line| line.trim_end_matches(" (*)")).collect();
     let packages = lines.iter().filter_map(|line| {
         let (package, licence) = line.split_once('\t')?;
-        Some(Dependency { name: package.split(' ').next()?.to_owned(), licence: licence.to_owned() })
+        Some(LicensedPackage { name: package.split(' ').next()?.to_owned(), licence: licence.to_owned() })
     });
     packages.collect()
 }
 
 /// Checks every package against the lists above.
-pub(super) fn check(dependencies: &[Dependency]) -> Vec<Problem> {
+pub(super) fn check(dependencies: &[LicensedPackage]) -> Vec<Finding> {
     let mut problems = Vec::new();
-    for Dependency { name, licence } in dependencies {
+    for LicensedPackage { name, licence } in dependencies {
         let is_exception = EXCEPTIONS.contains(&(name.as_str(), licence.as_str()));
         if !is_exception && !Expression(licence).is_allowed() {
             let message = format!("package {name} has the licence {licence:?}, which is not on the list");
-            problems.push(Problem::new("Cargo.lock", 1, message));
+            problems.push(Finding::new("Cargo.lock", 1, message));
         }
         if let Some((_, reason)) = BANNED.iter().find(|(banned, _)| banned == name) {
-            problems.push(Problem::new("Cargo.lock", 1, format!("package {name} {reason}")));
+            problems.push(Finding::new("Cargo.lock", 1, format!("package {name} {reason}")));
         }
     }
     problems
@@ -159,7 +161,7 @@ mod tests {
 
     #[test]
     fn banned_packages_are_named_with_the_reason() {
-        let dependencies = [Dependency { name: "bincode".into(), licence: "MIT".into() }];
+        let dependencies = [LicensedPackage { name: "bincode".into(), licence: "MIT".into() }];
         let problems = check(&dependencies);
         assert_eq!(problems[0].message, "package bincode is unmaintained (RUSTSEC-2025-0141)");
     }

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use indicatif::ProgressBar;
 use serde::Serialize;
+use sharp_draw::svg_to_png;
 use sharp_maps::generate;
 use sharp_plan::write_atomic;
 use sharp_regions::{
@@ -17,7 +18,6 @@ use sharp_space::{OccupancyGrid, Seed};
 use crate::args::RegionsTrain;
 use crate::commands::regions::label_robot;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::render::svg_to_png;
 use crate::tensorboard::EventFile;
 use crate::{input, pictures, progress};
 

@@ -124,6 +124,7 @@ fn blank_report(
         cost_update: args.cost_update.name(),
         noise: args.noise.clone(),
         seed,
+        library: sharp.library().folder().map_or("none".to_owned(), |folder| folder.display().to_string()),
         map: MapReport::new(&map.name, &map.grid),
         regions: file.regions.clone(),
         states: file.rbvd.len(),
@@ -193,9 +194,10 @@ fn print_report(report: &SolveReport) {
     }
     for leg in &report.plan {
         say!(
-            "  {:<14} {:>5.1} m {:>5.1} s  holds {:>4}/{:<4} on arrival  {}{}",
+            "  {:<14} {:>5.1} m  time {:>5} s  cost {:>6.1} s  succeeds {:>4}/{:<4} on arrival  {}{}",
             leg.option,
             leg.length_m,
+            leg.time_s.map_or("-".to_owned(), |seconds| format!("{seconds:.1}")),
             leg.cost_s,
             leg.on_arrival.successes,
             leg.on_arrival.episodes,
@@ -213,6 +215,7 @@ fn print_report(report: &SolveReport) {
             report.reuse.uses
         );
     }
+    say!("library: {}", report.library);
     let time = &report.time_s;
     say!(
         "took {:.1} s: regions {:.1}, abstraction {:.1}, search {:.1}, guides {:.1}, learning {:.1}, verification {:.1}",

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use sharp_draw::numbers::{percent, plain, seconds};
+use sharp_draw::{Axis, Panel};
+
 use super::cases::{Mean, Problem, Results, Setting, problem, ready_s, tally};
-use super::figure::{
-    Axis, Figure, INK, Panel, RIGHT, SOFT, Style, TEXT, TOP, Table, legend, marker, percent, plain, seconds,
-};
+use super::figure::{Figure, LABEL, Style, Table, heading, marker, method_legend, noted};
 use super::lines::ResultLine;
-use crate::render::{Anchor, Chart};
 
 const ROW: f64 = 13.0;
 const HEADER: f64 = 20.0;
@@ -94,7 +94,7 @@ pub(super) fn figure(results: &Results<'_>) -> Option<Figure> {
                   of solving. The hollow marker above each is the whole on the same problems. Recovery plays no \
                   part in predictions."
             .to_owned(),
-        legend: legend(rows.iter().map(|row| row.options)),
+        legend: noted(&method_legend(rows.iter().map(|row| row.options)), "hollow: the whole, on the same problems"),
         panels: robots().map(success_panel).chain(robots().map(time_panel)).collect(),
         table: table(&rows),
     })
@@ -121,7 +121,7 @@ fn rows<'a>(ablation: &Ablation, results: &Results<'a>) -> Vec<Row<'a>> {
 }
 
 fn success_panel(rows: &[Row<'_>]) -> Panel {
-    let axis = Axis::of_shares();
+    let axis = Axis::of_shares().label("success");
     panel(rows, &format!("{}: success", rows[0].robot), (&axis, percent), |lines| {
         let tally = tally(lines);
         let values = [tally.lower95(), tally.rate(), tally.upper95()];
@@ -132,9 +132,10 @@ fn success_panel(rows: &[Row<'_>]) -> Panel {
 fn time_panel(rows: &[Row<'_>]) -> Panel {
     let logs =
         || rows.iter().flat_map(|row| [&row.without, &row.whole]).map(|lines| solving_s(lines).log10());
-    let axis = Axis::decades(logs().fold(0.0, f64::min), logs().fold(0.0, f64::max));
+    let axis =
+        Axis::decades(logs().fold(0.0, f64::min), logs().fold(0.0, f64::max)).label("time to solve, seconds");
     let tick = |log| plain(10_f64.powf(log));
-    panel(rows, &format!("{}: seconds to solve", rows[0].robot), (&axis, tick), |lines| {
+    panel(rows, &format!("{}: time to solve", rows[0].robot), (&axis, tick), |lines| {
         ([solving_s(lines).log10(); 3], seconds(solving_s(lines)))
     })
 }
@@ -152,15 +153,12 @@ fn panel(
     shown: impl Fn(&[&ResultLine]) -> ([f64; 3], String),
 ) -> Panel {
     let groups: Vec<&[Row<'_>]> = rows.chunk_by(|a, b| a.name == b.name).collect();
-    let bottom = TOP + HEADER * groups.len() as f64 + 2.0 * ROW * rows.len() as f64;
-    let mut panel = Panel::new(title.to_owned(), bottom + 18.0);
-    axis.draw(&mut panel.chart, [TOP, bottom], tick);
-    let mut top = TOP;
+    let bottom = Panel::TOP + HEADER * groups.len() as f64 + 2.0 * ROW * rows.len() as f64;
+    let mut panel = Panel::new(title.to_owned(), bottom + Axis::FOOT);
+    axis.draw(&mut panel.chart, [Panel::TOP, bottom], tick);
+    let mut top = Panel::TOP;
     for group in groups {
-        // The rules of the axis shall not cross the words.
-        let width = Chart::text_width(group[0].name, TEXT) + 6.0;
-        panel.chart.rect([0.0, top + 4.0], [width, HEADER - 6.0], "#fff");
-        panel.chart.text([0.0, top + 15.0], Anchor::Start, TEXT, SOFT, group[0].name);
+        heading(&mut panel.chart, [0.0, top + 15.0], group[0].name);
         top += HEADER;
         for row in group {
             for (lines, is_whole) in [(&row.whole, true), (&row.without, false)] {
@@ -173,7 +171,7 @@ fn panel(
                     if is_whole { 1.0 } else { 2.0 },
                 );
                 marker(&mut panel.chart, [axis.at(value), y], &style, is_whole);
-                panel.chart.text([RIGHT + 8.0, y + 4.0], Anchor::Start, TEXT, INK, number);
+                panel.chart.text([Panel::NUMBERS, y + 4.0], LABEL.end(), number);
                 top += ROW;
             }
         }

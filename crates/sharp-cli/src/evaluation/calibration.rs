@@ -2,20 +2,21 @@
 
 use std::collections::BTreeMap;
 
+use sharp_draw::numbers::percent;
+use sharp_draw::{Axis, Color, Panel};
 use sharp_drive::SuccessCount;
 
 use super::cases::Mean;
-use super::figure::{Axis, Figure, INK, Panel, SOFT, Style, TEXT, Table, legend, marker, percent};
+use super::figure::{Figure, Style, Table, marker, method_legend};
 use super::lines::ResultLine;
-use crate::render::Anchor;
 
 /// The plotted square: left, right, top, bottom.
-const AREA: [f64; 4] = [46.0, 336.0, 32.0, 322.0];
-const HEIGHT: f64 = 368.0;
+const AREA: [f64; 4] = [60.0, 340.0, 30.0, 310.0];
+const HEIGHT: f64 = AREA[3] + Axis::FOOT;
 
 /// All problems of one environment, robot and kind of option.
 #[derive(Debug)]
-struct Point<'a> {
+struct CalibrationPoint<'a> {
     robot: &'a str,
     options: &'a str,
     /// Mean over the problems.
@@ -33,7 +34,7 @@ pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
         name: "calibration",
         title: "Predicted and measured success",
         caption: caption(&solved),
-        legend: legend(solved.iter().map(|line| line.options.as_str())),
+        legend: method_legend(solved.iter().map(|line| line.options.as_str())),
         panels: points.chunk_by(|a, b| a.robot == b.robot).map(|points| panel(points, low)).collect(),
         table: Table { columns: columns.collect(), rows: solved.iter().map(|line| row(line)).collect() },
     }
@@ -58,16 +59,13 @@ fn caption(solved: &[&ResultLine]) -> String {
     )
 }
 
-fn points<'a>(solved: &[&'a ResultLine]) -> Vec<Point<'a>> {
+fn points<'a>(solved: &[&'a ResultLine]) -> Vec<CalibrationPoint<'a>> {
     let mut groups: BTreeMap<_, Vec<&'a ResultLine>> = BTreeMap::new();
     for &line in solved {
         groups.entry((&*line.robot, &*line.env, &*line.options)).or_default().push(line);
     }
-    let point = |((robot, _, options), lines): ((&'a str, &str, &'a str), Vec<&ResultLine>)| Point {
-        robot,
-        options,
-        predicted: predicted(&lines),
-        measured: measured(&lines),
+    let point = |((robot, _, options), lines): ((&'a str, &str, &'a str), Vec<&ResultLine>)| {
+        CalibrationPoint { robot, options, predicted: predicted(&lines), measured: measured(&lines) }
     };
     groups.into_iter().map(point).collect()
 }
@@ -102,7 +100,7 @@ fn yes_or_no(yes: bool) -> String {
 }
 
 /// The tenth at or below everything that is shown: what is near 1 can be told apart.
-fn lowest(points: &[Point<'_>]) -> f64 {
+fn lowest(points: &[CalibrationPoint<'_>]) -> f64 {
     let low = points.iter().map(|point| point.measured.lower95().min(point.predicted)).fold(0.9, f64::min);
     ((low * 10.0).floor() / 10.0).clamp(0.0, 0.9)
 }
@@ -124,18 +122,16 @@ fn row(line: &ResultLine) -> Vec<String> {
 }
 
 /// The points of one robot.
-fn panel(points: &[Point<'_>], low: f64) -> Panel {
+fn panel(points: &[CalibrationPoint<'_>], low: f64) -> Panel {
     let [left, right, top, bottom] = AREA;
-    let across = Axis::new([low, 1.0], [left, right]);
-    let up = Axis::new([low, 1.0], [bottom, top]);
+    let across = Axis::new([low, 1.0]).between([left, right]).label("predicted success");
+    let up = Axis::new([low, 1.0]).between([bottom, top]).label("measured success");
     let mut panel = Panel::new(points[0].robot.to_owned(), HEIGHT);
     let chart = &mut panel.chart;
     across.draw(chart, [top, bottom], percent);
     up.draw_upright(chart, [left, right], percent);
-    chart.line([left, bottom], [right, top], SOFT, 1.0);
-    chart.text([(left + right) / 2.0, bottom + 32.0], Anchor::Middle, TEXT, INK, "predicted success");
-    chart.text([right, top - 10.0], Anchor::End, TEXT, INK, "measured success, upwards");
-    for Point { options, predicted, measured, .. } in points {
+    chart.line([left, bottom], [right, top], Color::SOFT, 1.0);
+    for CalibrationPoint { options, predicted, measured, .. } in points {
         let (x, style) = (across.at(*predicted), Style::of(options));
         chart.line([x, up.at(measured.lower95())], [x, up.at(measured.upper95())], style.color, 1.0);
         marker(chart, [x, up.at(measured.rate())], &style, false);

@@ -21,12 +21,12 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
+use sharp_draw::svg_to_png;
 use sharp_plan::write_atomic;
 
 use self::cases::Results;
 use self::figure::Figure;
 use crate::outcome::Failure;
-use crate::render::svg_to_png;
 
 pub(crate) use lines::{
     Machine, ResultLine, default_regions, problem_folder, read_baselines, row_text, variant,
@@ -55,9 +55,9 @@ pub(crate) fn write(evaluation: &Evaluation<'_>) -> Result<PathBuf, Failure> {
     let results = Results::new(&evaluation.lines);
     let figures = figures(&results);
     for figure in &figures {
-        let (plain, side_px) = figure.to_plain_svg();
-        write_atomic(&folder.join(format!("{}.svg", figure.name)), figure.to_svg().as_bytes())?;
-        write_atomic(&folder.join(format!("{}.png", figure.name)), &svg_to_png(&plain, side_px)?)?;
+        let (svg, side_px) = figure.to_svg();
+        write_atomic(&folder.join(format!("{}.svg", figure.name)), svg.as_bytes())?;
+        write_atomic(&folder.join(format!("{}.png", figure.name)), &svg_to_png(&svg, side_px)?)?;
     }
     let galleries = gallery::collect(&results.sharp(results.main), evaluation.out)?;
     for picture in galleries.iter().flat_map(|gallery| &gallery.pictures) {

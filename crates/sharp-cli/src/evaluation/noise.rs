@@ -2,17 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use sharp_draw::numbers::{percent, plain};
+use sharp_draw::{Axis, Panel};
 use sharp_drive::SuccessCount;
 
 use super::cases::{Problem, Results, Setting, method, problem, tally};
-use super::figure::{Axis, Figure, INK, Panel, Style, TEXT, TOP, Table, legend, marker, percent, plain};
+use super::figure::{Figure, Style, Table, marker, method_legend};
 use super::lines::ResultLine;
 use super::rows::label;
-use crate::render::Anchor;
 
 /// The plotted area: left, right, top, bottom.
-const AREA: [f64; 4] = [46.0, 344.0, TOP + 6.0, 236.0];
-const HEIGHT: f64 = 282.0;
+const AREA: [f64; 4] = [60.0, 340.0, Panel::TOP + 6.0, 236.0];
+const HEIGHT: f64 = AREA[3] + Axis::FOOT;
 /// Between the marks of two methods at one factor, user units: intervals shall not hide each other.
 const ASIDE: f64 = 5.0;
 
@@ -59,7 +60,7 @@ pub(super) fn figure(results: &Results<'_>) -> Option<Figure> {
                   95 % interval. Policies are learnt and verified under the noise that they are driven in. Marks \
                   of methods stand side by side."
             .to_owned(),
-        legend: legend(series.iter().map(|series| series.method)),
+        legend: method_legend(series.iter().map(|series| series.method)),
         panels: series.chunk_by(|a, b| a.robot == b.robot).map(panel).collect(),
         table: Table {
             columns: vec!["robot", "method", "noise", "problems", "success", "share", "95 % interval"],
@@ -107,13 +108,11 @@ fn of_method<'a>(robot: &'a str, method: &'a str, lines: &[(f64, &'a ResultLine)
 fn panel(series: &[Series<'_>]) -> Panel {
     let [left, right, top, bottom] = AREA;
     let most = series.iter().flat_map(|series| &series.points).map(|point| point.0).fold(1.0, f64::max);
-    let across = Axis { ends: [left + 20.0, right - 20.0], ..Axis::from_zero(most) };
-    let up = Axis::new([0.0, 1.0], [bottom, top]);
+    let across = Axis::from_zero(most).between([left + 20.0, right - 20.0]).label("times the nominal noise");
+    let up = Axis::of_shares().between([bottom, top]).label("success");
     let mut panel = Panel::new(series[0].robot.to_owned(), HEIGHT);
     across.draw(&mut panel.chart, [top, bottom], plain);
     up.draw_upright(&mut panel.chart, [left, right], percent);
-    let middle = (left + right) / 2.0;
-    panel.chart.text([middle, bottom + 34.0], Anchor::Middle, TEXT, INK, "times the nominal noise");
     for (index, series) in series.iter().enumerate() {
         draw(&mut panel, series, (&across, &up), ASIDE * aside(index));
     }

@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 use std::fmt::{Display, Write};
 
+use sharp_draw::escape;
+
 use super::cases::{Results, Setting, tally};
 use super::figure::{Figure, Table};
 use super::gallery::Gallery;
 use super::lines::ResultLine;
 use super::missing::Missing;
-use crate::render::{Lettering, escape};
 
 const STYLE: &str = include_str!("page.css");
 
@@ -110,10 +111,10 @@ fn navigation(parts: &Parts<'_>) -> String {
 fn section(figure: &Figure) -> String {
     let Figure { name, title, caption, .. } = figure;
     let mut html = format!("<section id=\"{name}\">\n<h2>{title}</h2>\n<p>{}</p>\n", escape(caption));
-    html += &figure.legend.to_svg("legend", Lettering::Text);
+    html += &figure.legend.to_svg("legend");
     html += "<div class=\"panels\">\n";
     for panel in &figure.panels {
-        html += &panel.chart.to_svg(&format!("{title}: {}", panel.title), Lettering::Text);
+        html += &panel.chart.to_svg(&format!("{title}: {}", panel.title));
     }
     html += "</div>\n";
     html += &table(&figure.table);

@@ -2,26 +2,28 @@
 
 use std::collections::BTreeMap;
 
-use super::figure::{Axis, Figure, INK, LEFT, Panel, RIGHT, SOFT, TEXT, TOP, Table, key, plain, seconds};
+use sharp_draw::numbers::{plain, seconds};
+use sharp_draw::{Axis, Color, LegendItem, Marker, Panel, legend};
+
+use super::figure::{Figure, LABEL, Table, heading};
 use super::lines::ResultLine;
-use crate::render::{Anchor, Shape};
 use crate::report::SolveTimes;
 
 const BAR: f64 = 13.0;
 const HEADER: f64 = 20.0;
 
 /// A phase: its name, its colour, and how long it took.
-type Phase = (&'static str, &'static str, fn(&SolveTimes) -> f64);
+type Phase = (&'static str, Color, fn(&SolveTimes) -> f64);
 
 /// Phases in the order of the algorithm.
 const PHASES: [Phase; 7] = [
-    ("regions", "#cc79a7", |time| time.regions),
-    ("abstraction", "#e69f00", |time| time.abstraction),
-    ("search", "#f0e442", |time| time.search),
-    ("guides", "#56b4e9", |time| time.guide),
-    ("learning", "#0072b2", |time| time.learn),
-    ("verification", "#009e73", |time| time.verify),
-    ("rest", "#999999", rest),
+    ("regions", Color::hex(0xcc79a7), |time| time.regions),
+    ("abstraction", Color::hex(0xe69f00), |time| time.abstraction),
+    ("search", Color::hex(0xf0e442), |time| time.search),
+    ("guides", Color::hex(0x56b4e9), |time| time.guide),
+    ("learning", Color::hex(0x0072b2), |time| time.learn),
+    ("verification", Color::hex(0x009e73), |time| time.verify),
+    ("rest", Color::hex(0x999999), rest),
 ];
 
 /// What no other phase counts: reading the map, writing the plan and its pictures.
@@ -45,7 +47,7 @@ pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
                   share a library and are solved in order, so later ones reuse what earlier ones learnt. Each \
                   panel has an axis of its own."
             .to_owned(),
-        legend: key(&PHASES.map(|(name, color, _)| (name, color, Shape::Square))),
+        legend: legend(&PHASES.map(|(label, color, _)| LegendItem { label, color, marker: Marker::Square })),
         panels: bars.chunk_by(|a, b| a.0.0 == b.0.0).map(panel).collect(),
         table: Table { columns, rows: bars.iter().map(row).collect() },
     }
@@ -85,14 +87,15 @@ fn row(((env, robot, options, problem), time): &(Bar<'_>, SolveTimes)) -> Vec<St
 /// The bars of one environment.
 fn panel(bars: &[(Bar<'_>, SolveTimes)]) -> Panel {
     let groups: Vec<_> = bars.chunk_by(|a, b| (a.0.1, a.0.2) == (b.0.1, b.0.2)).collect();
-    let bottom = TOP + HEADER * groups.len() as f64 + BAR * bars.len() as f64;
-    let mut panel = Panel::new(format!("environment {}", bars[0].0.0), bottom + 18.0);
-    let axis = Axis::from_zero(bars.iter().map(|(_, time)| time.total).fold(0.0, f64::max));
-    axis.draw(&mut panel.chart, [TOP, bottom], plain);
-    let mut top = TOP;
+    let bottom = Panel::TOP + HEADER * groups.len() as f64 + BAR * bars.len() as f64;
+    let mut panel = Panel::new(format!("environment {}", bars[0].0.0), bottom + Axis::FOOT);
+    let most = bars.iter().map(|(_, time)| time.total).fold(0.0, f64::max);
+    let axis = Axis::from_zero(most).label("wall time, seconds");
+    axis.draw(&mut panel.chart, [Panel::TOP, bottom], plain);
+    let mut top = Panel::TOP;
     for group in groups {
         let (_, robot, options, _) = group[0].0;
-        panel.chart.text([LEFT, top + 15.0], Anchor::Start, TEXT, SOFT, format!("{robot}, {options}"));
+        heading(&mut panel.chart, [Panel::LEFT, top + 15.0], &format!("{robot}, {options}"));
         top += HEADER;
         for ((.., problem), time) in group {
             draw(&mut panel, (*problem, time), &axis, top);
@@ -104,14 +107,14 @@ fn panel(bars: &[(Bar<'_>, SolveTimes)]) -> Panel {
 
 fn draw(panel: &mut Panel, (problem, time): (usize, &SolveTimes), axis: &Axis, top: f64) {
     let chart = &mut panel.chart;
-    chart.text([LEFT - 4.0, top + 10.0], Anchor::End, TEXT, INK, format!("P{problem}"));
+    chart.text([Panel::LEFT - 4.0, top + 10.0], LABEL.end(), format!("P{problem}"));
     let mut spent = 0.0;
     for (_, color, of) in PHASES {
         let left = axis.at(spent);
         spent += of(time);
         chart.rect([left, top + 2.0], [axis.at(spent) - left, BAR - 4.0], color);
     }
-    chart.text([RIGHT + 6.0, top + 10.0], Anchor::Start, TEXT, INK, seconds(time.total));
+    chart.text([Panel::NUMBERS, top + 10.0], LABEL.end(), seconds(time.total));
 }
 
 #[cfg(test)]

@@ -3,11 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use super::figure::{
-    Axis, Figure, INK, LEFT, Panel, RIGHT, Style, TEXT, TOP, Table, legend, marker, percent,
-};
+use sharp_draw::numbers::percent;
+use sharp_draw::{Axis, Panel};
+
+use super::figure::{Figure, LABEL, Style, Table, marker, method_legend};
 use super::lines::ResultLine;
-use crate::render::Anchor;
 use crate::report::Reuse;
 
 const BAR: f64 = 15.0;
@@ -48,7 +48,7 @@ pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
                   table stands beside it: its maps and problems are others, it does not define its figure, and \
                   it does not tell the robots apart."
             .to_owned(),
-        legend: legend(lines.iter().map(|line| line.options.as_str()).chain(["paper"])),
+        legend: method_legend(lines.iter().map(|line| line.options.as_str()).chain(["paper"])),
         panels: sums.chunk_by(|a, b| a.0.0 == b.0.0).map(panel).collect(),
         table: Table {
             columns: vec!["env", "robot", "options", "reused", "uses", "share", "in the paper"],
@@ -88,23 +88,23 @@ fn row(((robot, env, options), reuse): &(Group<'_>, Reuse)) -> Vec<String> {
 
 fn panel(groups: &[(Group<'_>, Reuse)]) -> Panel {
     let envs: Vec<_> = groups.chunk_by(|a, b| a.0.1 == b.0.1).collect();
-    let bottom = TOP + GAP * envs.len() as f64 + BAR * groups.len() as f64;
-    let mut panel = Panel::new(groups[0].0.0.to_owned(), bottom + 18.0);
-    let axis = Axis::of_shares();
-    axis.draw(&mut panel.chart, [TOP, bottom], percent);
-    let mut top = TOP;
+    let bottom = Panel::TOP + GAP * envs.len() as f64 + BAR * groups.len() as f64;
+    let mut panel = Panel::new(groups[0].0.0.to_owned(), bottom + Axis::FOOT);
+    let axis = Axis::of_shares().label("option uses that were reused");
+    axis.draw(&mut panel.chart, [Panel::TOP, bottom], percent);
+    let mut top = Panel::TOP;
     for groups in envs {
         top += GAP;
-        panel.chart.text([0.0, top + 11.0], Anchor::Start, TEXT, INK, groups[0].0.1);
+        panel.chart.text([0.0, top + 11.0], LABEL, groups[0].0.1);
         for ((_, env, options), reuse) in groups {
             let (end, y, style) = (axis.at(share(reuse)), top + BAR / 2.0, Style::of(options));
-            panel.chart.line([LEFT, y], [end, y], style.color, 4.0);
+            panel.chart.line([Panel::LEFT, y], [end, y], style.color, 4.0);
             marker(&mut panel.chart, [end, y], &style, false);
             if let Some(share) = paper(env, options) {
                 marker(&mut panel.chart, [axis.at(share), y], &Style::of("paper"), false);
             }
             let number = format!("{}/{}", reuse.reused, reuse.uses);
-            panel.chart.text([RIGHT + 8.0, top + 11.0], Anchor::Start, TEXT, INK, number);
+            panel.chart.text([Panel::NUMBERS, top + 11.0], LABEL.end(), number);
             top += BAR;
         }
     }

@@ -1,11 +1,11 @@
 //! Figures with one row a method under each problem: time until it can drive, success, driving time.
 
+use sharp_draw::numbers::{percent, plain, seconds};
+use sharp_draw::{Axis, Chart, Panel};
+
 use super::cases::{Case, cases};
-use super::figure::{
-    Axis, Figure, INK, Panel, RIGHT, Style, TEXT, TOP, Table, legend, marker, percent, plain, seconds,
-};
+use super::figure::{Figure, LABEL, Style, Table, marker, method_legend, noted};
 use super::lines::ResultLine;
-use crate::render::Anchor;
 
 const ROW: f64 = 13.0;
 const GAP: f64 = 7.0;
@@ -39,7 +39,7 @@ pub(super) fn time(name: &'static str, title: &'static str, lines: &[&ResultLine
         number: |case| seconds(case.ready_s.mean),
         axis: |cases| {
             let logs = || cases.iter().map(|case| case.ready_s.mean.max(SHORTEST_S).log10());
-            Axis::decades(logs().fold(0.0, f64::min), logs().fold(0.0, f64::max))
+            Axis::decades(logs().fold(0.0, f64::min), logs().fold(0.0, f64::max)).label("wall time, seconds")
         },
         tick: |log| plain(10_f64.powf(log)),
         columns: &[("time s", |case| case.ready_s.text(2))],
@@ -57,7 +57,7 @@ pub(super) fn success(name: &'static str, title: &'static str, lines: &[&ResultL
     let shown = Shown {
         values: |case| Some([case.tally.lower95(), case.tally.rate(), case.tally.upper95()]),
         number: |case| format!("{}/{}", case.tally.successes, case.tally.episodes),
-        axis: |_| Axis::of_shares(),
+        axis: |_| Axis::of_shares().label("success"),
         tick: percent,
         columns: &[
             ("success", |case| format!("{}/{}", case.tally.successes, case.tally.episodes)),
@@ -77,7 +77,7 @@ pub(super) fn driving(lines: &[&ResultLine]) -> Figure {
         number: |case| case.driving_s.map_or_else(|| "never".to_owned(), |time| seconds(time.mean)),
         axis: |cases| {
             let times = cases.iter().filter_map(|case| case.driving_s);
-            Axis::from_zero(times.map(|time| time.mean).fold(0.0, f64::max))
+            Axis::from_zero(times.map(|time| time.mean).fold(0.0, f64::max)).label("driving time, seconds")
         },
         tick: plain,
         columns: &[("driving s", |case| case.driving_s.map_or_else(|| "-".to_owned(), |time| time.text(1)))],
@@ -100,24 +100,31 @@ fn figure(
         name,
         title,
         caption: caption.to_owned(),
-        legend: legend(cases.iter().map(|case| case.method)),
+        legend: legend_of(&cases),
         panels: cases.chunk_by(same).map(|cases| panel(cases, shown)).collect(),
         table: table(&cases, shown.columns),
     }
 }
 
+/// The methods, and what hollow markers say where there are any.
+fn legend_of(cases: &[Case<'_>]) -> Chart {
+    let methods = method_legend(cases.iter().map(|case| case.method));
+    let has_hollow = cases.iter().any(|case| case.tally.successes == 0);
+    if has_hollow { noted(&methods, "hollow: never reached the goal") } else { methods }
+}
+
 fn panel(cases: &[Case<'_>], shown: &Shown) -> Panel {
     let problems: Vec<&[Case<'_>]> = cases.chunk_by(|a, b| a.problem == b.problem).collect();
-    let bottom = TOP + GAP * problems.len() as f64 + ROW * cases.len() as f64;
+    let bottom = Panel::TOP + GAP * problems.len() as f64 + ROW * cases.len() as f64;
     let title = format!("environment {}, {}", cases[0].env, cases[0].robot);
-    let mut panel = Panel::new(title, bottom + 18.0);
+    let mut panel = Panel::new(title, bottom + Axis::FOOT);
     let axis = (shown.axis)(cases);
-    axis.draw(&mut panel.chart, [TOP, bottom], shown.tick);
-    let mut top = TOP;
+    axis.draw(&mut panel.chart, [Panel::TOP, bottom], shown.tick);
+    let mut top = Panel::TOP;
     for cases in problems {
         top += GAP;
         let label = format!("P{}", cases[0].problem);
-        panel.chart.text([0.0, top + 10.0], Anchor::Start, TEXT, INK, label);
+        panel.chart.text([0.0, top + 10.0], LABEL, label);
         for case in cases {
             mark(&mut panel, case, shown, &axis, top + ROW / 2.0);
             top += ROW;
@@ -132,7 +139,7 @@ fn mark(panel: &mut Panel, case: &Case<'_>, shown: &Shown, axis: &Axis, y: f64) 
         panel.chart.line([axis.at(low), y], [axis.at(high), y], style.color, 2.0);
         marker(&mut panel.chart, [axis.at(value), y], &style, case.tally.successes == 0);
     }
-    panel.chart.text([RIGHT + 8.0, y + 4.0], Anchor::Start, TEXT, INK, (shown.number)(case));
+    panel.chart.text([Panel::NUMBERS, y + 4.0], LABEL.end(), (shown.number)(case));
 }
 
 fn table(cases: &[Case<'_>], more: &[Column]) -> Table {
@@ -163,7 +170,6 @@ pub(super) fn label(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::Lettering;
     use crate::report::SolveTimes;
 
     fn baseline(successes: u32) -> ResultLine {
@@ -186,13 +192,13 @@ mod tests {
 
     #[test]
     fn who_never_arrived_has_no_driving_time_and_a_hollow_marker() {
-        let svg = driving(&[&baseline(0)]).to_svg();
+        let svg = driving(&[&baseline(0)]).to_svg().0;
         assert!(svg.contains(">never</text>") && !svg.contains(">12.5 s</text>"), "{svg}");
         let hollow = |successes| {
             time("time", "Time", &[&baseline(successes)]).panels[0]
                 .chart
-                .to_svg("", Lettering::Text)
-                .matches("#fff")
+                .to_svg("")
+                .matches("#ffffff")
                 .count()
         };
         assert_eq!(hollow(0), hollow(1) + 1, "a white heart");
@@ -204,7 +210,7 @@ mod tests {
         slow.time_s.total = 2400.0;
         let quick =
             ResultLine { time_s: SolveTimes::default(), ..ResultLine::example("a", "limo", "interface", 1) };
-        let svg = time("time", "Time", &[&slow, &quick]).to_svg();
+        let svg = time("time", "Time", &[&slow, &quick]).to_svg().0;
         for tick in [">0.01<", ">1<", ">10000<", ">2400 s<", ">0.00 s<"] {
             assert!(svg.contains(tick), "no {tick} in {svg}");
         }

@@ -16,7 +16,7 @@
 //! ```
 
 use serde::Deserialize;
-use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Pose};
+use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Pose, trig};
 
 use super::error::MapError;
 use super::load::check_size;
@@ -180,7 +180,7 @@ impl Canvas {
         match *piece {
             Furniture::Box { .. } => self.fill(x, y, |_, _| true),
             Furniture::Disc { x: cx, y: cy, radius } => {
-                self.fill(x, y, |px, py| (px - cx).hypot(py - cy) <= radius);
+                self.fill(x, y, |px, py| trig::hypot(px - cx, py - cy) <= radius);
             }
         }
         Ok(())

@@ -106,7 +106,7 @@ impl FloorplanKind {
 
 /// The clearance at which the main part of a plan is connected, metres: half the width of a Husky and 8 cm,
 /// so that it has room to steer.
-const ROOM_TO_PASS_M: f64 = 0.42;
+const CLEARANCE_TO_PASS_M: f64 = 0.42;
 
 /// Share of the passable area that must be connected.
 const CONNECTED_SHARE: f64 = 0.8;
@@ -172,7 +172,7 @@ fn is_connected(grid: &OccupancyGrid) -> bool {
     let clearance = DistanceField::new(grid);
     let frame = grid.frame();
     let mut open: Vec<bool> =
-        (0..frame.len()).map(|i| clearance.at(frame.cell(i)) >= ROOM_TO_PASS_M).collect();
+        (0..frame.len()).map(|i| clearance.at(frame.cell(i)) >= CLEARANCE_TO_PASS_M).collect();
     let total = open.iter().filter(|&&cell| cell).count();
     let mut largest = 0;
     for seed in 0..frame.len() {

@@ -3,10 +3,10 @@
 //! [`OptionLearner`] is the seam. Ours: [`PaperProtocol`] trains a network for every option, [`Selection`] takes
 //! the cheapest of what is at hand and trains only where a plan falls short, [`PriorOnly`] takes the prior.
 
+mod network;
 mod options;
 mod paper;
 mod prior_only;
-mod sac;
 mod selection;
 
 use std::fmt::Debug;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_drive::{Driver, InitialStates, StateSpread};
-use sharp_guide::{GuidedOption, LegId};
+use sharp_drive::{Driver, InitialStates};
+use sharp_guide::GuidedOption;
 use sharp_sim::RobotState;
 use sharp_space::Seed;
 
@@ -138,10 +138,5 @@ pub(crate) fn task<'a>(
 
 /// Where `option` begins: at the initial configuration, or spread over its initiation set.
 pub(crate) fn initial_states(problem: &Problem<'_>, option: &GuidedOption, seed: Seed) -> InitialStates {
-    match option.id {
-        LegId::First(_) | LegId::Direct => InitialStates::exactly(RobotState::at_rest(problem.query.start)),
-        LegId::Option(_) | LegId::Last(..) => {
-            InitialStates::spread(problem.world, option, &StateSpread::default(), STATE_POOL, seed)
-        }
-    }
+    InitialStates::of_option(problem.world, option, problem.query.start, STATE_POOL, seed)
 }

@@ -3,18 +3,46 @@
 use std::sync::Arc;
 
 use sharp_drive::PolicyInterface;
-use sharp_guide::PseudoReward;
-use sharp_rl::TrainSettings;
+use sharp_guide::{PseudoReward, Reward};
+use sharp_rl::{Learner, SacLearner, TrainSettings};
 
-use super::sac::{SacTraining, train_network};
+use super::network::{NetworkTraining, train_network};
 use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner};
 
 /// Soft actor-critic on absolute poses with the pseudo-reward of definition 9: at most 150,000 steps, an
 /// evaluation of 20 episodes each 10,000, one environment.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct PaperProtocol {
-    /// Budget and hyperparameters.
-    pub train: TrainSettings,
+    /// The learner.
+    pub learner: Arc<dyn Learner>,
+    /// What it is paid.
+    pub reward: Arc<dyn Reward>,
+}
+
+impl PaperProtocol {
+    /// Soft actor-critic with these settings.
+    #[must_use]
+    pub fn new(settings: TrainSettings) -> Self {
+        Self { learner: Arc::new(SacLearner::new(settings)), reward: Arc::new(PseudoReward::default()) }
+    }
+
+    /// The same with another learner.
+    #[must_use]
+    pub fn with_learner(self, learner: Arc<dyn Learner>) -> Self {
+        Self { learner, ..self }
+    }
+
+    /// The same with another reward.
+    #[must_use]
+    pub fn with_reward(self, reward: Arc<dyn Reward>) -> Self {
+        Self { reward, ..self }
+    }
+}
+
+impl Default for PaperProtocol {
+    fn default() -> Self {
+        Self::new(TrainSettings::default())
+    }
 }
 
 impl OptionLearner for PaperProtocol {
@@ -23,11 +51,10 @@ impl OptionLearner for PaperProtocol {
         task: &LearningTask<'_>,
         monitor: &dyn LearningMonitor,
     ) -> Result<LearntPolicy, LearnFailure> {
-        let training = SacTraining {
+        let training = NetworkTraining {
             interface: PolicyInterface::Absolute { reach_m: task.world.robot.waypoint_reach_m },
-            reward: Arc::new(PseudoReward::default()),
-            networks: None,
-            settings: &self.train,
+            reward: Arc::clone(&self.reward),
+            learner: &*self.learner,
             environments: 1,
         };
         train_network(task, &training, monitor)

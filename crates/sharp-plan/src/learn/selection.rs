@@ -8,10 +8,10 @@ use sharp_drive::{
     prior_interface,
 };
 use sharp_guide::ProgressReward;
-use sharp_rl::{Exploration, StopRule, TrainSettings};
+use sharp_rl::{Exploration, SacLearner, SacStart, StopRule, TrainSettings};
 use sharp_sim::NoiseModel;
 
-use super::sac::{SacTraining, train_network};
+use super::network::{NetworkTraining, train_network};
 use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner};
 
 /// Rounds of successive halving: the share of the screening episodes that each candidate drives, and how many
@@ -161,11 +161,12 @@ impl Selection {
     ) -> Result<LearntPolicy, LearnFailure> {
         let robot = &task.world.robot;
         let reward = ProgressReward { contact: FINE_CONTACT, ..ProgressReward::default() };
-        let training = SacTraining {
+        let networks = Box::new(Prior::shipped(robot).networks().clone());
+        let learner = SacLearner::new(self.train.clone()).with_start(SacStart::Networks(networks));
+        let training = NetworkTraining {
             interface: prior_interface(robot, PolicyContext::new(&task.conditions.noise, 1.0)),
             reward: Arc::new(reward),
-            networks: Some(Prior::shipped(robot).networks()),
-            settings: &self.train,
+            learner: &learner,
             environments: self.environments,
         };
         train_network(task, &training, monitor)

@@ -1,23 +1,21 @@
-//! Training the network of one option by soft actor-critic.
+//! Training the network of one option by whatever [`Learner`] is at hand.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use sharp_drive::{Link, NetworkPolicy, OptionPolicy, OptionTask, PolicyInterface, Scenario, SingleOption};
 use sharp_guide::Reward;
-use sharp_rl::{Progress, SacState, TrainSettings, fine_tune, train};
+use sharp_rl::{Environment, Learner, Progress};
 use sharp_sim::RobotState;
 
 use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy};
 
 /// How a network is trained.
 #[derive(Clone, Debug)]
-pub(crate) struct SacTraining<'a> {
+pub(crate) struct NetworkTraining<'a> {
     pub(crate) interface: PolicyInterface,
     pub(crate) reward: Arc<dyn Reward>,
-    /// Networks to begin with; fresh ones if `None`.
-    pub(crate) networks: Option<&'a SacState>,
-    pub(crate) settings: &'a TrainSettings,
+    pub(crate) learner: &'a dyn Learner,
     /// Environments that are stepped in turn.
     pub(crate) environments: u64,
 }
@@ -25,23 +23,21 @@ pub(crate) struct SacTraining<'a> {
 /// Trains a network on the option of `task` and estimates how often it succeeds.
 pub(crate) fn train_network(
     task: &LearningTask<'_>,
-    training: &SacTraining<'_>,
+    training: &NetworkTraining<'_>,
     monitor: &dyn LearningMonitor,
 ) -> Result<LearntPolicy, LearnFailure> {
     let source =
         Arc::new(SingleOption { scenario: scenario(task, training), states: Arc::clone(&task.states) });
-    let environment =
-        |index| OptionTask::new(Arc::clone(&source) as _, task.seed.child("environment", index));
-    let mut environments: Vec<OptionTask> = (0..training.environments).map(environment).collect();
+    let environment = |index| -> Box<dyn Environment> {
+        Box::new(OptionTask::new(Arc::clone(&source) as _, task.seed.child("environment", index)))
+    };
+    let mut environments: Vec<_> = (0..training.environments).map(environment).collect();
     let mut observer = |progress: &Progress<'_>| {
         monitor.trained(progress);
         if monitor.should_stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let mut rng = task.seed.stream("sac", 0);
-    let trained = match training.networks {
-        Some(networks) => fine_tune(&mut environments, networks, training.settings, &mut rng, &mut observer),
-        None => train(&mut environments, training.settings, &mut rng, &mut observer),
-    };
+    let trained = training.learner.learn(&mut environments, &mut rng, &mut observer);
     let trained = trained.map_err(LearnFailure::Broken)?;
     if monitor.should_stop() {
         return Err(LearnFailure::Stopped);
@@ -52,7 +48,7 @@ pub(crate) fn train_network(
     Ok(LearntPolicy { policy, estimate, env_steps: trained.env_steps, gradient_steps: trained.updates })
 }
 
-fn scenario(task: &LearningTask<'_>, training: &SacTraining<'_>) -> Scenario {
+fn scenario(task: &LearningTask<'_>, training: &NetworkTraining<'_>) -> Scenario {
     Scenario {
         world: task.world.clone(),
         simulator: task.conditions.simulator.fork(),

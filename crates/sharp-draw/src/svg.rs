@@ -1,10 +1,14 @@
-//! A writer of the little SVG that the pictures need.
+//! A writer of the few elements of SVG that pictures need.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// `text` for the inside of an element or attribute, of SVG and of HTML.
-pub(crate) fn escape(text: &str) -> Cow<'_, str> {
+use crate::color::Color;
+use crate::font;
+
+/// `text` for the inside of an element or attribute, of SVG and of HTML: `&`, `<`, `>` and quotes are replaced.
+#[must_use]
+pub fn escape(text: &str) -> Cow<'_, str> {
     if !text.contains(['&', '<', '>', '"', '\'']) {
         return Cow::Borrowed(text);
     }
@@ -12,8 +16,8 @@ pub(crate) fn escape(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.replace('"', "&quot;").replace('\'', "&#39;"))
 }
 
-/// Writes `value` with at most two decimals: a hundredth of a cell is finer than any pixel.
-pub(super) fn number(value: f64) -> String {
+/// Writes `value` with at most two decimals: a hundredth of a pixel or of a cell cannot be seen.
+pub(crate) fn number(value: f64) -> String {
     let text = format!("{value:.2}");
     let trimmed = text.trim_end_matches('0').trim_end_matches('.');
     if trimmed == "-0" { "0".into() } else { trimmed.into() }
@@ -21,38 +25,51 @@ pub(super) fn number(value: f64) -> String {
 
 /// A document under construction.
 #[derive(Debug)]
-pub(super) struct Svg {
+pub(crate) struct Svg {
     text: String,
     open: Vec<&'static str>,
+    size: [f64; 2],
 }
 
 impl Svg {
-    /// A document that shows `view` (left, top, width, height in user units) with a longer side of
-    /// `side_px` pixels.
-    pub(super) fn new(view: [f64; 4], side_px: f64) -> Self {
-        let mut svg = Self { text: String::new(), open: Vec::new() };
-        let [_, _, width, height] = view;
-        let scale = side_px / width.max(height);
+    /// A document of `size` (width, height) in user units, each shown as a pixel.
+    pub(crate) fn new([width, height]: [f64; 2]) -> Self {
+        let mut svg = Self { text: String::new(), open: Vec::new(), size: [width, height] };
         svg.open(
             "svg",
             &[
                 ("xmlns", "http://www.w3.org/2000/svg".into()),
-                ("viewBox", view.map(number).join(" ")),
-                ("width", number(width * scale)),
-                ("height", number(height * scale)),
+                ("viewBox", [0.0, 0.0, width, height].map(number).join(" ")),
+                ("width", number(width)),
+                ("height", number(height)),
+                ("font-family", font::FAMILY.into()),
             ],
         );
         svg
     }
 
+    /// Fills the whole document with `color`.
+    pub(crate) fn background(&mut self, color: Color) {
+        let [width, height] = self.size.map(number);
+        self.element("rect", &[("width", width), ("height", height), ("fill", color.into())]);
+    }
+
+    /// Opens a window of `size` pixels at the top left corner that shows `view` (left, top, width,
+    /// height in the units of what is drawn inside) and cuts off the rest.
+    pub(crate) fn open_window(&mut self, view: [f64; 4], [width, height]: [f64; 2]) {
+        let attributes =
+            [("viewBox", view.map(number).join(" ")), ("width", number(width)), ("height", number(height))];
+        self.open("svg", &attributes);
+    }
+
     /// Opens an element that holds others.
-    pub(super) fn open(&mut self, name: &'static str, attributes: &[(&str, String)]) {
+    pub(crate) fn open(&mut self, name: &'static str, attributes: &[(&str, String)]) {
         self.tag(name, attributes, ">\n");
         self.open.push(name);
     }
 
     /// Closes the element opened last.
-    pub(super) fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         if let Some(name) = self.open.pop() {
             // Writing to a String cannot fail.
             let _ = writeln!(self.text, "</{name}>");
@@ -60,18 +77,18 @@ impl Svg {
     }
 
     /// Writes an element without content.
-    pub(super) fn element(&mut self, name: &str, attributes: &[(&str, String)]) {
+    pub(crate) fn element(&mut self, name: &str, attributes: &[(&str, String)]) {
         self.tag(name, attributes, "/>\n");
     }
 
     /// Writes an element that holds `text`.
-    pub(super) fn text(&mut self, name: &str, attributes: &[(&str, String)], text: &str) {
+    pub(crate) fn text(&mut self, name: &str, attributes: &[(&str, String)], text: &str) {
         self.tag(name, attributes, ">");
         let _ = writeln!(self.text, "{}</{name}>", escape(text));
     }
 
     /// Closes everything and returns the document.
-    pub(super) fn finish(mut self) -> String {
+    pub(crate) fn finish(mut self) -> String {
         while !self.open.is_empty() {
             self.close();
         }
@@ -89,11 +106,11 @@ impl Svg {
 
 /// The `d` attribute of a path, built step by step in user units.
 #[derive(Clone, Debug, Default)]
-pub(super) struct PathData(String);
+pub(crate) struct PathData(String);
 
 impl PathData {
-    /// A path through `points`, in order; closed if `closed`.
-    pub(super) fn polyline(points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+    /// A path through `points`, in order; open at its end.
+    pub(crate) fn polyline(points: impl IntoIterator<Item = [f64; 2]>) -> Self {
         let mut path = Self::default();
         for (i, point) in points.into_iter().enumerate() {
             path = if i == 0 { path.move_to(point) } else { path.line_to(point) };
@@ -102,28 +119,28 @@ impl PathData {
     }
 
     /// Starts a new stroke.
-    pub(super) fn move_to(self, point: [f64; 2]) -> Self {
+    pub(crate) fn move_to(self, point: [f64; 2]) -> Self {
         self.command('M', &[point])
     }
 
     /// Draws a straight line.
-    pub(super) fn line_to(self, point: [f64; 2]) -> Self {
+    pub(crate) fn line_to(self, point: [f64; 2]) -> Self {
         self.command('L', &[point])
     }
 
     /// Draws a quadratic curve that leaves and arrives towards `control`.
-    pub(super) fn curve_to(self, control: [f64; 2], point: [f64; 2]) -> Self {
+    pub(crate) fn curve_to(self, control: [f64; 2], point: [f64; 2]) -> Self {
         self.command('Q', &[control, point])
     }
 
     /// Closes the stroke.
-    pub(super) fn close(mut self) -> Self {
+    pub(crate) fn close(mut self) -> Self {
         self.0.push('z');
         self
     }
 
     /// The finished attribute.
-    pub(super) fn finish(self) -> String {
+    pub(crate) fn finish(self) -> String {
         self.0
     }
 
@@ -152,7 +169,7 @@ mod tests {
 
     #[test]
     fn text_is_escaped() {
-        let mut svg = Svg::new([0.0, 0.0, 1.0, 1.0], 1.0);
+        let mut svg = Svg::new([1.0, 1.0]);
         svg.text("text", &[("class", "\"x\"".into())], "a < b & 'c'");
         let document = svg.finish();
         assert!(
@@ -163,7 +180,7 @@ mod tests {
 
     #[test]
     fn elements_nest_and_close() {
-        let mut svg = Svg::new([0.0, 0.0, 4.0, 2.0], 100.0);
+        let mut svg = Svg::new([4.0, 2.0]);
         svg.open("g", &[("fill", "red".into())]);
         svg.element(
             "path",
@@ -171,7 +188,8 @@ mod tests {
         );
         assert_eq!(
             svg.finish(),
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 4 2\" width=\"100\" height=\"50\">\n\
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 4 2\" width=\"4\" height=\"2\" \
+             font-family=\"Inter, system-ui, sans-serif\">\n\
              <g fill=\"red\">\n<path d=\"M0 0L1.5 2Q0 1 2 2\"/>\n</g>\n</svg>\n"
         );
     }

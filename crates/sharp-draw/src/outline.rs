@@ -11,7 +11,7 @@ const STEPS: [(isize, isize); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 /// The outline of the cells for which `inside(column, line)` holds, line 0 at the top.
 ///
 /// The path is to be filled by the even-odd or the non-zero rule; it is empty if no cell is inside.
-pub(super) fn outline(width: usize, height: usize, inside: impl Fn(usize, usize) -> bool) -> String {
+pub(crate) fn outline(width: usize, height: usize, inside: impl Fn(usize, usize) -> bool) -> String {
     let stride = width + 1;
     let mut edges = directed_edges(width, height, inside);
     let mut path = String::new();

@@ -1,0 +1,56 @@
+//! SVG to PNG.
+
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::{Options, Tree};
+
+use crate::font;
+
+/// Why a picture cannot become pixels.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PngError {
+    /// The document is no SVG.
+    #[error("picture is not readable SVG: {0}")]
+    Unreadable(String),
+    /// There is no picture of this size.
+    #[error("picture cannot be {max_side_px} pixels wide, expected a number from 1 on that fits in memory")]
+    Size {
+        /// Longer side that was asked for, pixels.
+        max_side_px: u32,
+    },
+    /// The pixels cannot be written as PNG.
+    #[error("picture cannot be encoded as PNG: {0}")]
+    Encoding(String),
+}
+
+/// Draws `svg` so that its longer side is `max_side_px` pixels, and returns the bytes of a PNG file.
+///
+/// Text is drawn in the embedded font, whatever fonts the machine has; files and addresses that the
+/// document names are not read.
+///
+/// # Errors
+/// Returns an error if `svg` cannot be read or `max_side_px` is zero or too large for memory.
+pub fn svg_to_png(svg: &str, max_side_px: u32) -> Result<Vec<u8>, PngError> {
+    let options = Options { fontdb: font::database(), ..Options::default() };
+    let tree = Tree::from_str(svg, &options).map_err(|error| PngError::Unreadable(error.to_string()))?;
+    let (width, height) = (tree.size().width(), tree.size().height());
+    let scale = max_side_px as f32 / width.max(height);
+    let side = |length: f32| ((length * scale).round() as u32).max(1);
+    let pixmap = (max_side_px > 0).then(|| Pixmap::new(side(width), side(height)));
+    let mut pixmap = pixmap.flatten().ok_or(PngError::Size { max_side_px })?;
+    resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixmap.as_mut());
+    pixmap.encode_png().map_err(|error| PngError::Encoding(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        assert!(matches!(svg_to_png("<svg", 10), Err(PngError::Unreadable(_))));
+        let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"4\" height=\"2\"/>";
+        assert_eq!(svg_to_png(svg, 0), Err(PngError::Size { max_side_px: 0 }));
+        assert_eq!(svg_to_png(svg, u32::MAX), Err(PngError::Size { max_side_px: u32::MAX }));
+    }
+}
