@@ -130,6 +130,7 @@ impl ChainRun {
 
 #[cfg(test)]
 mod tests {
+    use sharp_sim::SimulatorKind;
     use sharp_space::Pose;
 
     use super::*;
@@ -145,8 +146,8 @@ mod tests {
             options.iter().map(|option| Driver::new(option, &policy, None)).collect();
         let noise = NoiseModel::none();
         let start = RobotState::at_rest(options[0].guide.start());
-        let trial = MonteCarlo::new(&world, &*world.simulator(sharp_sim::SimulatorKind::Kinematic), &noise)
-            .with_episodes(1);
+        let simulator = world.simulator(SimulatorKind::Kinematic);
+        let trial = MonteCarlo::new(&world, &*simulator, &noise).with_episodes(1);
         let run = trial.runs(&drivers, start).remove(0);
         assert_eq!(run.end, EpisodeEnd::Reached, "{run:?}");
         assert!((0..options.len()).all(|index| run.passed(index)), "every option succeeded");
