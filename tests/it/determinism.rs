@@ -9,7 +9,7 @@ use sharp_drive::{GuideProgress, GuideView, Observation, OptionPolicy, Policy, S
 use sharp_guide::{GuidePath, LegId};
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_plan::{
-    AbstractionFile, Conditions, Method, OptionLibrary, Outcome, PaperProtocol, Plan, Problem, Query,
+    AbstractionFile, Conditions, Method, OptionLibrary, Outcome, PaperProtocol, Plan, PlanningProblem, Query,
     Selection, Solution, StoredOption, map_hash, solve,
 };
 use sharp_rl::{StopRule, TrainSettings};
@@ -52,7 +52,8 @@ fn quick_fast() -> Method {
 fn solved(world: &TestWorld, method: &Method, seed: Seed, library: &mut OptionLibrary) -> Solution {
     let conditions = Conditions::new(&world.world, NoiseModel::nominal());
     let (world, abstraction) = (&world.world, &world.abstraction);
-    let problem = Problem { world, method, conditions: &conditions, query: across(), seed, monitor: &() };
+    let problem =
+        PlanningProblem { world, method, conditions: &conditions, query: across(), seed, monitor: &() };
     match solve(&problem, abstraction, library) {
         Ok(Outcome::Solved(solution)) => *solution,
         other => panic!("no solution but {other:?}"),

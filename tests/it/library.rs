@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use sharp_options::OptionKind;
 use sharp_plan::{
-    Conditions, Method, OptionLibrary, Outcome, Problem, Query, Selection, Solution, map_hash, solve,
+    Conditions, Method, OptionLibrary, Outcome, PlanningProblem, Query, Selection, Solution, map_hash, solve,
 };
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{Pose, Seed};
@@ -45,7 +45,7 @@ fn solved(world: &TestWorld, library: &mut OptionLibrary) -> Solution {
     let method = quick();
     let conditions = Conditions::new(&world.world, NoiseModel::nominal());
     let query = Query { start: Pose::new(1.0, 1.4, 0.0), goal: Pose::new(18.8, 1.6, 0.0) };
-    let problem = Problem {
+    let problem = PlanningProblem {
         world: &world.world,
         method: &method,
         conditions: &conditions,

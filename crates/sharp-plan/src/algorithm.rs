@@ -201,7 +201,7 @@ mod tests {
         let (world, abstraction) = world(drawing, kind);
         let conditions = Conditions::new(&world, NoiseModel::nominal());
         let problem =
-            Problem { world: &world, method, conditions: &conditions, query, seed: Seed(1), monitor };
+            PlanningProblem { world: &world, method, conditions: &conditions, query, seed: Seed(1), monitor };
         let mut library = OptionLibrary::in_memory();
         let outcome = solve(&problem, &abstraction, &mut library).expect("no files");
         (outcome, library)

@@ -89,7 +89,7 @@ impl Sharp {
             family: Arc::new(sharp_options::InterfaceOptions),
             kind: OptionKind::Interface,
             settings,
-            method: Method::fast(),
+            method: Method::default(),
             conditions,
             library: OptionLibrary::in_memory(),
             built: None,

@@ -2,7 +2,8 @@
 
 use rayon::ThreadPoolBuilder;
 use sharp_drive::{
-    Command, Controller, Decision, EpisodeEnd, Motion, MppiSettings, ProfiledFollower, Readiness, Wall, World,
+    Command, Controller, Decision, EpisodeEnd, Motion, MppiSettings, ProfiledFollower, Readiness, Supervisor,
+    World,
 };
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::Query;
@@ -96,7 +97,7 @@ fn each_drives(
     let rrt = rrt(planner, world, query, settings.contact_ends);
     let methods: [(&str, &dyn Contender); 3] = [("rrt", &rrt), ("track", &track), ("mppi", &mpc)];
     for (name, method) in methods {
-        check(name, compare(method, world, &query, settings, &Wall::silent()));
+        check(name, compare(method, world, &query, settings, &Supervisor::silent()));
     }
 }
 
@@ -170,7 +171,7 @@ fn bull(speed_mps: f64, nominal_time_s: f64, contact_ends: bool) -> Driven {
     let query = query((7.0, 1.0), (9.0, 3.0));
     let settings = settings(&world, NoiseModel::none(), contact_ends);
     let bull = Bull { nominal_time_s, speed_mps, bumped: false };
-    compare(&bull, &world, &query, &settings, &Wall::silent()).swap_remove(0)
+    compare(&bull, &world, &query, &settings, &Supervisor::silent()).swap_remove(0)
 }
 
 #[test]
@@ -207,7 +208,7 @@ fn no_way_is_said_and_not_driven() {
         let mut controller = rrt.controller(RobotState::at_rest(query.start), 0);
         assert_eq!((controller.prepare(), controller.decide()), (Readiness::Ready, Decision::Lost));
         let settings = settings(&world, NoiseModel::none(), contact_ends);
-        let driven = compare(&rrt, &world, &query, &settings, &Wall::silent());
+        let driven = compare(&rrt, &world, &query, &settings, &Supervisor::silent());
         assert!(driven.iter().all(|one| one.end == EpisodeEnd::Lost), "contact ends: {contact_ends}");
         assert!(driven.iter().all(|one| one.record.path_m == 0.0), "nobody drove");
     }

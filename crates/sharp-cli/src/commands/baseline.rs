@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use sharp_bench::{
-    ComparisonSettings, Contender as System, DecisionTimes, Driven, Mpc, RoutePlanner, Rrt, Sac, SacBudget,
-    Track, compare,
+    ComparisonSettings, Contender as System, DecisionTimes, Driven, FlatSac, Mpc, RoutePlanner, Rrt,
+    SacBudget, Track, compare,
 };
 use sharp_drive::{EpisodeEnd, MppiSettings, ProfiledFollower, SuccessCount, Supervisor, World};
 use sharp_motion::{Budget, RrtSettings};
@@ -207,7 +207,7 @@ impl Bench<'_> {
             if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let conditions = Conditions::new(&self.world, self.settings.noise.clone());
-        let learnt = Sac::learn(&self.world, self.query, (&conditions, self.seed), budget, &mut observer)
+        let learnt = FlatSac::learn(&self.world, self.query, (&conditions, self.seed), budget, &mut observer)
             .map_err(|error| Failure::from(anyhow::Error::from(error)))?;
         // The limit is for learning: what was learnt is driven in any case.
         let driven = self.drive(&learnt, stopwatch, &is_interrupted);
