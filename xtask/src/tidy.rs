@@ -3,6 +3,7 @@
 mod assets;
 mod code;
 mod docs;
+mod glossary;
 mod layers;
 mod licences;
 mod methods;
@@ -48,6 +49,7 @@ pub(crate) fn run() -> anyhow::Result<u8> {
     problems.extend(sources::check(&tree));
     problems.extend(docs::check(&tree));
     problems.extend(assets::check(&tree));
+    problems.extend(glossary::check(&tree));
     problems.extend(one_loop::check(&tree));
     problems.extend(methods::check(&tree));
     problems.extend(names::check(&tree));

@@ -7,7 +7,7 @@ use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Seed;
 
 use crate::automaton::{Automaton, Link, Visit};
-use crate::episode::{Controller, Decision, Episode, EpisodeEnd, Motion, Wall};
+use crate::episode::{Controller, Decision, Episode, EpisodeEnd, Motion, Supervisor};
 use crate::policy::{OptionPolicy, Policy};
 use crate::situation::Observation;
 use crate::world::World;
@@ -61,7 +61,7 @@ impl Chain {
         let observation = self.first(start, episode.vehicle().noise());
         let automaton = Automaton::new(Arc::clone(&self.links), observation);
         let mut controller = ChainController { world, policies: &mut self.policies, automaton, entered: 0 };
-        let end = episode.drive(&mut controller, &Wall::silent());
+        let end = episode.drive(&mut controller, &Supervisor::silent());
         let arrival = controller.automaton.observation().state;
         ChainRun { visits: controller.automaton.visits().to_vec(), arrival, end }
     }

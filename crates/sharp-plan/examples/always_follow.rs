@@ -16,11 +16,7 @@ use sharp_space::{Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose
 struct AlwaysFollow;
 
 impl OptionLearner for AlwaysFollow {
-    fn learn(
-        &self,
-        task: &LearningTask<'_>,
-        _: &dyn LearningMonitor,
-    ) -> Result<LearntPolicy, LearnFailure> {
+    fn learn(&self, task: &LearningTask<'_>, _: &dyn LearningMonitor) -> Result<LearntPolicy, LearnFailure> {
         let policy = OptionPolicy::Follower(Follower::cautious(&task.world.robot));
         let estimate = task.estimate(&policy);
         Ok(LearntPolicy::untrained(policy, estimate))

@@ -15,7 +15,7 @@ use crate::files::FileError;
 use crate::learn::learn_missing;
 use crate::library::OptionLibrary;
 use crate::policies::Policies;
-use crate::problem::Problem;
+use crate::problem::PlanningProblem;
 use crate::query::Phase;
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
@@ -42,7 +42,7 @@ pub enum Outcome {
 /// # Errors
 /// Returns an error if the library cannot be written.
 pub fn solve(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
 ) -> Result<Outcome, FileError> {
@@ -53,11 +53,11 @@ pub fn solve(
 
 /// The algorithm itself, at most 60 lines.
 fn algorithm_1(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
 ) -> Result<Outcome, FileError> {
-    let Problem { world, method, query, seed, monitor, .. } = *problem;
+    let PlanningProblem { world, method, query, seed, monitor, .. } = *problem;
     monitor.phase(Phase::Search);
     // 8: s_i, s_g <- get_abstract_states(x_i, x_g)
     let known = Policies::guides(library);
@@ -116,7 +116,7 @@ fn names(plan: &[Arc<GuidedOption>]) -> Vec<LegId> {
 
 /// The cheapest plan by all that is known by now.
 fn cheapest(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     search: &mut Search<'_>,
     policies: &Policies<'_>,
 ) -> Option<Vec<Arc<GuidedOption>>> {
@@ -124,7 +124,7 @@ fn cheapest(
     search.plan(&cost_s, problem.monitor)
 }
 
-fn join(problem: &Problem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOption>> {
+fn join(problem: &PlanningProblem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOption>> {
     if !problem.method.join_guides {
         return plan;
     }
@@ -132,7 +132,11 @@ fn join(problem: &Problem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOp
     join_guides(plan, problem.query.start, &robot, &problem.method.search.guide)
 }
 
-fn has_weak_option(problem: &Problem<'_>, plan: &[Arc<GuidedOption>], policies: &Policies<'_>) -> bool {
+fn has_weak_option(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+) -> bool {
     let is_weak = |option: &Arc<GuidedOption>| {
         let SuccessEstimate { count, .. } = policies.learnt(option.id).estimate;
         count.episodes > 0 && count.rate() < problem.method.usable_success

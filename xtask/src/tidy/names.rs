@@ -35,7 +35,7 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
 }
 
 /// The types that `code` declares, with their lines.
-fn declared(code: &str) -> Vec<(String, usize)> {
+pub(super) fn declared(code: &str) -> Vec<(String, usize)> {
     let mut found = Vec::new();
     for word in DECLARATIONS {
         for at in words(code, word) {
