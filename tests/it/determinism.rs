@@ -36,7 +36,7 @@ fn tiny_paper() -> Method {
     });
     let paper = Method::paper().with_episodes(20, 20, 1000);
     let name = paper.name.clone();
-    paper.with_learner(&name, Arc::new(PaperProtocol { train }))
+    paper.with_learner(&name, Arc::new(PaperProtocol::new(train)))
 }
 
 /// The default method with fewer episodes.

@@ -33,7 +33,7 @@ fn small_budget() -> PaperProtocol {
         train.evaluation_episodes = 50;
         train.stop = StopRule::Success { rate: 0.95, episodes: 100 };
     });
-    PaperProtocol { train }
+    PaperProtocol::new(train)
 }
 
 #[test]

@@ -23,7 +23,7 @@ use sharp_drive::{
     prior_interface,
 };
 use sharp_guide::{GuidedOption, ProgressReward, PseudoReward, Reward, Role};
-use sharp_plan::{Conditions, LearningTask, Method, PaperProtocol, Plan};
+use sharp_plan::{Conditions, LearningTask, Method, Plan};
 use sharp_rl::{
     Actor, Environment, Evaluation, StopRule, Stream, TrainError, TrainSettings, evaluate, train,
 };
@@ -104,7 +104,7 @@ impl PeerTask {
 
     fn paper(&self, seed: Seed, limit_s: f64) -> Result<Value, TrainError> {
         let tasks = vec![self.paper_task(seed.child("environment", 0))];
-        let settings = PaperProtocol::default().train;
+        let settings = TrainSettings::default();
         learn(tasks, self.paper_task(seed.child("judge", 0)), settings, seed, limit_s)
     }
 
