@@ -3,20 +3,21 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
-use sharp_guide::GuidePath;
+use sharp_drive::{GuideProgress, GuideView, Observation, OptionPolicy, Policy, Situation};
+use sharp_guide::{GuidePath, LegId};
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_plan::{
-    AbstractionFile, DecisionScratch, GuideView, LearnSettings, LearningMode, LegId, OptionLibrary,
-    OptionPolicy, Outcome, Percept, Plan, Query, Solution, SolveSettings, StoredOption, Tracker, map_hash,
-    solve,
+    AbstractionFile, Conditions, Method, OptionLibrary, Outcome, PaperProtocol, Plan, PlanningProblem, Query,
+    Selection, Solution, StoredOption, map_hash, solve,
 };
 use sharp_rl::{StopRule, TrainSettings};
 use sharp_sim::{NoiseModel, RobotModel, RobotState};
 use sharp_space::{Pose, Seed, Vector};
 use tempfile::TempDir;
 
-use crate::worlds::{ROOMS, World};
+use crate::worlds::{ROOMS, TestWorld};
 
 /// From the left room to the right one.
 fn across() -> Query {
@@ -24,7 +25,7 @@ fn across() -> Query {
 }
 
 /// The paper's protocol with a budget that only shows that it runs: nothing good is learnt.
-fn tiny_paper(world: &World, seed: u64) -> SolveSettings {
+fn tiny_paper() -> Method {
     let train = TrainSettings::default().with(|train| {
         train.sac.hidden = vec![16, 16];
         train.sac.batch = 32;
@@ -33,51 +34,46 @@ fn tiny_paper(world: &World, seed: u64) -> SolveSettings {
         train.evaluation_episodes = 2;
         train.stop = StopRule::Never;
     });
-    let learn = LearnSettings {
-        screening_episodes: 4,
-        certify_episodes: 20,
-        train,
-        ..LearnSettings::new(LearningMode::Paper)
-    };
-    let noise = NoiseModel::by_name("nominal").expect("a built-in noise");
-    SolveSettings {
-        learn,
-        verify_episodes: 20,
-        ..SolveSettings::new(&world.workspace, LearningMode::Paper, noise, Seed(seed))
-    }
+    let paper = Method::paper().with_episodes(20, 20, 1000);
+    let name = paper.name.clone();
+    paper.with_learner(&name, Arc::new(PaperProtocol::new(train)))
 }
 
-/// The default protocol with fewer episodes.
-fn quick_fast(world: &World, seed: u64) -> SolveSettings {
-    let noise = NoiseModel::by_name("nominal").expect("a built-in noise");
-    let settings = SolveSettings::new(&world.workspace, LearningMode::Fast, noise, Seed(seed));
-    let learn = LearnSettings { screening_episodes: 50, certify_episodes: 200, ..settings.learn };
-    SolveSettings { learn, repair_episodes: 100, verify_episodes: 100, repair_rounds: 1, ..settings }
+/// The default method with fewer episodes.
+fn quick_fast() -> Method {
+    let mut selection = Selection::default();
+    selection.screening_episodes = 50;
+    let mut method = Method::fast().with_episodes(200, 100, 100);
+    method.learner = Arc::new(selection);
+    (method.repair.rounds, method.repair.screening_episodes) = (1, 50);
+    method
 }
 
-fn solved(world: &World, settings: &SolveSettings, library: &mut OptionLibrary) -> Solution {
-    match solve(&world.workspace, &world.abstraction, across(), settings, library, &()) {
+fn solved(world: &TestWorld, method: &Method, seed: Seed, library: &mut OptionLibrary) -> Solution {
+    let conditions = Conditions::new(&world.world, NoiseModel::nominal());
+    let (world, abstraction) = (&world.world, &world.abstraction);
+    let problem =
+        PlanningProblem { world, method, conditions: &conditions, query: across(), seed, monitor: &() };
+    match solve(&problem, abstraction, library) {
         Ok(Outcome::Solved(solution)) => *solution,
         other => panic!("no solution but {other:?}"),
     }
 }
 
 /// Solves from nothing with `threads` threads and writes the plan to a folder.
-fn plan_folder(world: &World, settings: &SolveSettings, threads: usize) -> TempDir {
+fn plan_folder(world: &TestWorld, method: &Method, seed: Seed, threads: usize) -> TempDir {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    let solution = pool.install(|| solved(world, settings, &mut OptionLibrary::in_memory()));
-    let rbvd = (*world.abstraction.rbvd).clone();
+    let solution = pool.install(|| solved(world, method, seed, &mut OptionLibrary::in_memory()));
     let kind = world.abstraction.options.kind();
-    let map = map_hash(&world.workspace.grid);
-    let abstraction = AbstractionFile::new(map, "drawn".into(), kind, OptionSettings::default(), rbvd);
+    let map = map_hash(&world.world.grid);
+    let (states, settings) = (&*world.abstraction.states, OptionSettings::default());
+    let abstraction = AbstractionFile::new(map, "drawn".into(), kind, settings, states);
     let plan = Plan {
-        workspace: world.workspace.clone(),
+        world: world.world.clone(),
         abstraction: world.abstraction.clone(),
-        noise: settings.noise.clone(),
-        learning: settings.learn.mode,
-        cost_update: settings.search.cost_update,
-        failure_cost_s: settings.learn.failure_cost_s,
-        seed: settings.seed,
+        noise: NoiseModel::nominal(),
+        method: method.clone(),
+        seed,
         solution,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -97,12 +93,9 @@ fn name(path: &Path) -> String {
 }
 
 #[track_caller]
-fn assert_equal_bytes(
-    world: &World,
-    settings: impl Fn(&World, u64) -> SolveSettings,
-) -> BTreeMap<String, Vec<u8>> {
+fn assert_equal_bytes(world: &TestWorld, method: &Method) -> BTreeMap<String, Vec<u8>> {
     let [first, again, threads, other] = [(1, 1), (1, 1), (1, 2), (2, 1)]
-        .map(|(seed, threads)| content(plan_folder(world, &settings(world, seed), threads).path()));
+        .map(|(seed, threads)| content(plan_folder(world, method, Seed(seed), threads).path()));
     assert!(first == again, "the same seed twice gives other files");
     assert!(first == threads, "two threads give other files than one");
     assert!(first["plan.ron"] != other["plan.ron"], "the seed changes nothing");
@@ -112,80 +105,80 @@ fn assert_equal_bytes(
 #[test]
 fn plans_have_the_same_bytes_whatever_the_threads() {
     for kind in [OptionKind::Centroid, OptionKind::Interface] {
-        assert_equal_bytes(&World::drawn(ROOMS, RobotModel::husky(), kind), quick_fast);
+        assert_equal_bytes(&TestWorld::drawn(ROOMS, RobotModel::husky(), kind), &quick_fast());
     }
 }
 
 #[test]
 fn weights_have_the_same_bytes_whatever_the_threads() {
-    let world = World::drawn(ROOMS, RobotModel::husky(), OptionKind::Centroid);
-    let files = assert_equal_bytes(&world, tiny_paper);
+    let world = TestWorld::drawn(ROOMS, RobotModel::husky(), OptionKind::Centroid);
+    let files = assert_equal_bytes(&world, &tiny_paper());
     let weights = files.keys().filter(|file| file.ends_with(".safetensors")).count();
-    // Each leg has a network of its own: π_0, two options, π_{n+1}.
+    // Each option has a network of its own: π_0, two options, π_{n+1}.
     assert_eq!(weights, 4, "{:?}", files.keys());
 }
 
 /// What `policy` wants at 50 places beside `guide`, to the bit.
-fn decisions(world: &World, guide: &GuidePath, policy: &OptionPolicy) -> Vec<[u64; 3]> {
-    let view = GuideView { guide, next: None };
-    let mut scratch = DecisionScratch::default();
-    let decide = |index: u32| {
+fn decisions(world: &TestWorld, guide: &GuidePath, policy: &OptionPolicy) -> Vec<[u64; 3]> {
+    let (world, mut policy) = (&world.world, policy.clone());
+    let mut decide = |index: u32| {
         let offset = 0.01 * f64::from(index % 7) - 0.03;
         let on_guide = guide.pose_at(guide.length_m() * f64::from(index) / 50.0);
         let pose = Pose::at(on_guide.to_world(Vector::new(0.0, offset)), on_guide.heading);
-        let tracker = Tracker::start(guide, &pose);
-        let percept = Percept::first(RobotState::at_rest(pose), &NoiseModel::nominal());
-        let wanted = policy.decide(&world.workspace, &percept, &tracker, &view, &mut scratch);
+        let observation = Observation::first(RobotState::at_rest(pose), &NoiseModel::nominal());
+        let wanted = policy.decide(&Situation {
+            world,
+            observation: &observation,
+            progress: &GuideProgress::start(guide, &pose),
+            guide: GuideView { current: guide, next: None },
+        });
         [wanted.reach_m, wanted.bearing_rad, wanted.speed_mps].map(f64::to_bits)
     };
-    (0..50).map(decide).collect()
+    (0..50).map(&mut decide).collect()
 }
 
 #[test]
 fn learnt_policies_decide_the_same_from_a_plan_and_from_a_library() {
-    let world = World::drawn(ROOMS, RobotModel::husky(), OptionKind::Centroid);
-    let settings = tiny_paper(&world, 5);
-    let solution = solved(&world, &settings, &mut OptionLibrary::in_memory());
-    let folder = plan_folder(&world, &settings, 2);
-    let plan = Plan::load(folder.path(), (*world.workspace.grid).clone()).expect("a sound plan");
+    let world = TestWorld::drawn(ROOMS, RobotModel::husky(), OptionKind::Centroid);
+    let (method, seed) = (tiny_paper(), Seed(5));
+    let solution = solved(&world, &method, seed, &mut OptionLibrary::in_memory());
+    let folder = plan_folder(&world, &method, seed, 2);
+    let plan = Plan::load(folder.path(), (*world.world.grid).clone()).expect("a sound plan");
 
     let root = tempfile::tempdir().expect("a temporary folder");
     let mut library = OptionLibrary::open(root.path(), "rooms").expect("an empty library");
-    for (index, planned) in solution.legs.iter().enumerate() {
-        let expected = decisions(&world, &planned.leg.guide, &planned.learnt.policy);
-        let from_plan = decisions(&world, &planned.leg.guide, &plan.solution.legs[index].learnt.policy);
-        assert_eq!(from_plan, expected, "{} from the plan", planned.leg.id);
-        let LegId::Option(id) = planned.leg.id else { continue };
-        let corridor = planned.leg.corridor(&plan.workspace.grid);
-        let stored =
-            StoredOption { guide: planned.leg.guide.clone(), learnt: planned.learnt.clone(), corridor };
+    for (step, loaded) in solution.steps.iter().zip(&plan.solution.steps) {
+        let (option, learnt) = (&step.option, &step.learnt);
+        let expected = decisions(&world, &option.guide, &learnt.policy);
+        let from_plan = decisions(&world, &option.guide, &loaded.learnt.policy);
+        assert_eq!(from_plan, expected, "{} from the plan", option.id);
+        let LegId::Option(id) = option.id else { continue };
+        let corridor = sharp_plan::hash(&option.corridor(&plan.world.grid));
+        let stored = StoredOption { guide: option.guide.clone(), learnt: learnt.clone(), corridor };
         library.insert(id, stored).expect("a folder that can be written");
         let opened = OptionLibrary::open(root.path(), "rooms").expect("a sound library");
         let stored = opened.get(id).expect("just inserted");
-        assert_eq!(
-            decisions(&world, &stored.guide, &stored.learnt.policy),
-            expected,
-            "{id} from the library"
-        );
+        let from_library = decisions(&world, &stored.guide, &stored.learnt.policy);
+        assert_eq!(from_library, expected, "{id} from the library");
     }
     assert_eq!(library.len(), 2, "both options were learnt");
 }
 
 #[test]
 fn a_library_spares_learning_and_changes_no_option() {
-    let world = World::drawn(ROOMS, RobotModel::husky(), OptionKind::Centroid);
+    let world = TestWorld::drawn(ROOMS, RobotModel::husky(), OptionKind::Centroid);
     let root = tempfile::tempdir().expect("a temporary folder");
-    let settings = quick_fast(&world, 3);
+    let (method, seed) = (quick_fast(), Seed(3));
     let mut library = OptionLibrary::open(root.path(), "rooms").expect("an empty library");
-    let first = solved(&world, &settings, &mut library);
+    let first = solved(&world, &method, seed, &mut library);
     let (uses, reused) = first.reuse();
     assert!(uses > 0 && reused == 0, "{reused} of {uses} options reused from nothing");
     let files = content(&root.path().join("rooms"));
 
     let mut library = OptionLibrary::open(root.path(), "rooms").expect("a sound library");
-    let second = solved(&world, &settings, &mut library);
+    let second = solved(&world, &method, seed, &mut library);
     let (uses, reused) = second.reuse();
     assert_eq!(uses, reused, "options reused");
     assert_eq!(content(&root.path().join("rooms")), files, "reuse rewrites no file");
-    assert_eq!(second.predicted, first.predicted, "the same policies hold as often");
+    assert_eq!(second.predicted, first.predicted, "the same policies succeed as often");
 }

@@ -4,17 +4,18 @@
 use std::sync::Arc;
 
 use rand::RngExt;
+use sharp_drive::World;
 use sharp_maps::{FloorplanKind, generate};
 use sharp_options::{OptionKind, OptionSet, OptionSettings};
-use sharp_plan::{Abstraction, Query, Workspace};
+use sharp_plan::{Abstraction, Query};
 use sharp_rbvd::{Rbvd, RbvdSettings};
 use sharp_regions::{GeometricSettings, geometric_regions};
 use sharp_sim::RobotModel;
 use sharp_space::{Cell, DistanceField, OccupancyGrid, Pose, Region, RegionId, Seed, Stream};
 
 /// A map, a robot and the options between the map's regions.
-pub(crate) struct World {
-    pub(crate) workspace: Workspace,
+pub(crate) struct TestWorld {
+    pub(crate) world: World,
     pub(crate) abstraction: Abstraction,
 }
 
@@ -40,7 +41,7 @@ pub(crate) const ROOMS: &str = "
     #...................#...................#
     #########################################";
 
-impl World {
+impl TestWorld {
     /// A drawn map with cells of 0.2 m, on which the digits 0, 1, … mark regions of one cell.
     pub(crate) fn drawn(drawing: &str, robot: RobotModel, kind: OptionKind) -> Self {
         let plain: String = drawing.chars().map(|c| if c.is_ascii_digit() { '.' } else { c }).collect();
@@ -68,19 +69,18 @@ impl World {
 
     fn new(grid: OccupancyGrid, robot: RobotModel, regions: &[Region], kind: OptionKind) -> Self {
         let resolution_m = grid.frame().resolution_m;
-        let workspace = Workspace::new(grid, robot);
-        let settings =
-            RbvdSettings::for_footprint(&workspace.robot.footprint, 0.5 * resolution_m, resolution_m);
-        let rbvd = Rbvd::build(workspace.checker.field(), regions, &settings).expect("room for the robot");
+        let world = World::new(grid, robot);
+        let settings = RbvdSettings::for_footprint(&world.robot.footprint, 0.5 * resolution_m, resolution_m);
+        let rbvd = Rbvd::build(world.geometry.clearance(), regions, &settings).expect("room for the robot");
         let options = OptionSet::synthesize(&rbvd, kind, &OptionSettings::default());
-        Self { workspace, abstraction: Abstraction { rbvd: Arc::new(rbvd), options: Arc::new(options) } }
+        Self { world, abstraction: Abstraction { states: Arc::new(rbvd), options: Arc::new(options) } }
     }
 
     /// Two places where the robot fits whatever its heading, at random.
     pub(crate) fn query(&self, rng: &mut Stream) -> Query {
-        let field = self.workspace.checker.field();
+        let field = self.world.geometry.clearance();
         let frame = field.frame();
-        let room_m = self.workspace.robot.footprint.circumscribed_radius_m() + frame.resolution_m;
+        let room_m = self.world.robot.footprint.circumscribed_radius_m() + frame.resolution_m;
         let roomy: Vec<Cell> =
             (0..frame.len()).map(|index| frame.cell(index)).filter(|&cell| field.at(cell) > room_m).collect();
         let mut pose = || {

@@ -5,8 +5,10 @@ use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand::RngExt;
+use sharp_bench::RoutePlanner;
+use sharp_drive::World;
 use sharp_maps::{FloorplanKind, generate};
-use sharp_plan::{Query, RoutePlanner, Workspace};
+use sharp_plan::Query;
 use sharp_sim::RobotModel;
 use sharp_space::{Point, Pose, Seed, Stream};
 
@@ -14,9 +16,9 @@ use sharp_space::{Point, Pose, Seed, Stream};
 const QUERIES: usize = 10;
 
 /// Two places where the robot can turn round, at least half a map apart.
-fn query(workspace: &Workspace, side_m: f64, stream: &mut Stream) -> Query {
-    let room_m = workspace.robot.footprint.circumscribed_radius_m() + 0.2;
-    let field = workspace.checker.field();
+fn query(world: &World, side_m: f64, stream: &mut Stream) -> Query {
+    let room_m = world.robot.footprint.circumscribed_radius_m() + 0.2;
+    let field = world.geometry.clearance();
     let mut place = || loop {
         let point = Point::new(stream.random_range(0.0..side_m), stream.random_range(0.0..side_m));
         if field.clearance_lower_bound(point) > room_m {
@@ -36,14 +38,13 @@ fn routes(c: &mut Criterion) {
         for robot in [RobotModel::husky(), RobotModel::limo()] {
             let name = format!("route/{}/{side_m}m", robot.name);
             let stream = &mut Seed(1).stream("rooms", 0);
-            let workspace =
-                Workspace::new(generate(FloorplanKind::FurnishedRooms, side_m, 0.1, stream), robot);
-            let planner = RoutePlanner::new(&workspace);
-            let queries: Vec<Query> = (0..QUERIES).map(|_| query(&workspace, side_m, stream)).collect();
-            let solved = queries.iter().filter(|query| planner.plan(query).is_some()).count();
+            let world = World::new(generate(FloorplanKind::FurnishedRooms, side_m, 0.1, stream), robot);
+            let plan = |query: &Query| RoutePlanner::new(&world, query.goal).plan_from(query.start);
+            let queries: Vec<Query> = (0..QUERIES).map(|_| query(&world, side_m, stream)).collect();
+            let solved = queries.iter().filter(|query| plan(query).is_some()).count();
             assert!(2 * solved > QUERIES, "{name}: {solved} of {QUERIES} have a route");
             let mut next = queries.iter().cycle();
-            c.bench_function(&name, |b| b.iter(|| next.next().map(|query| planner.plan(query))));
+            c.bench_function(&name, |b| b.iter(|| next.next().map(plan)));
         }
     }
 }

@@ -4,7 +4,7 @@
 
 use sharp_bench::conformance::check_contender;
 use sharp_bench::{ComparisonSettings, Contender, compare};
-use sharp_drive::{Command, Controller, Decision, EpisodeEnd, Motion, Wall, World};
+use sharp_drive::{Command, Controller, Decision, EpisodeEnd, Motion, Supervisor, World};
 use sharp_plan::Query;
 use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
 use sharp_space::{OccupancyGrid, Point, Pose, Seed};
@@ -53,6 +53,6 @@ fn main() {
 
     let (simulator, noise) = (world.simulator(SimulatorKind::Planar), NoiseModel::nominal());
     let settings = ComparisonSettings { episodes: 10, simulator, noise, contact_ends: true, seed: Seed(1) };
-    let driven = compare(&beeline, &world, &query, &settings, &Wall::silent());
+    let driven = compare(&beeline, &world, &query, &settings, &Supervisor::silent());
     assert!(driven.iter().all(|episode| episode.end == EpisodeEnd::Reached), "nothing is in the way");
 }

@@ -1,7 +1,7 @@
 //! The suite that every [`Contender`] must pass, ours and anybody's.
 
 use sharp_drive::{
-    Command, Controller, Decision, Episode, EpisodeEnd, EpisodeRules, Motion, Readiness, Wall, World,
+    Command, Controller, Decision, Episode, EpisodeEnd, EpisodeRules, Motion, Readiness, Supervisor, World,
 };
 use sharp_plan::Query;
 use sharp_sim::{NoiseModel, RobotState, SimulatorKind};
@@ -56,7 +56,8 @@ pub fn check_contender(
     query: &Query,
 ) -> Result<(), ContenderViolation> {
     for episode in [0, 1] {
-        let (first, second) = (drive(contender, world, query, episode), drive(contender, world, query, episode));
+        let (first, second) =
+            (drive(contender, world, query, episode), drive(contender, world, query, episode));
         first.check(world, query)?;
         if first != second {
             let pairs = first.decisions.iter().zip(&second.decisions);
@@ -106,7 +107,7 @@ fn drive(contender: &dyn Contender, world: &World, query: &Query, number: u64) -
     episode.begin(start, Seed(1), number);
     let inner = contender.controller(start, number);
     let mut controller = DecisionRecorder { inner, decisions: Vec::new(), nominal_times_s: Vec::new() };
-    let end = episode.drive(&mut controller, &Wall::silent());
+    let end = episode.drive(&mut controller, &Supervisor::silent());
     let DecisionRecorder { decisions, nominal_times_s, .. } = controller;
     SuiteDrive { end, decisions, nominal_times_s, last: *episode.state() }
 }

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_drive::{Controller, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Wall, World};
+use sharp_drive::{Controller, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Supervisor, World};
 use sharp_plan::{ComposedPolicy, Plan, Query};
 use sharp_sim::{NoiseModel, RobotState, Simulator};
 use sharp_space::Seed;
@@ -76,7 +76,7 @@ pub fn compare(
     world: &World,
     query: &Query,
     settings: &ComparisonSettings,
-    wall: &Wall<'_>,
+    supervisor: &Supervisor<'_>,
 ) -> Vec<Driven> {
     let rules = EpisodeRules::default()
         .with_contact_ends(settings.contact_ends)
@@ -90,7 +90,7 @@ pub fn compare(
         let number = u64::from(number);
         let mut episode = episode.clone();
         episode.begin(start, settings.seed, number);
-        let end = episode.drive(&mut *contender.controller(start, number), wall);
+        let end = episode.drive(&mut *contender.controller(start, number), supervisor);
         Driven { end, record: episode.into_record() }
     };
     (0..settings.episodes).into_par_iter().map(drive).collect()

@@ -18,14 +18,16 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Value, json};
-use sharp_guide::{PseudoReward, ShapedReward};
-use sharp_plan::{
-    Expectation, Form, LearnSettings, LearningMode, Leg, LegTask, Lesson, Plan, RewardMode, Role,
-    StartSpread, Starts, prior,
+use sharp_drive::{
+    InitialStates, Link, OptionTask, PolicyContext, PolicyInterface, Scenario, SingleOption, StateSpread,
+    prior_interface,
 };
+use sharp_guide::{GuidedOption, ProgressReward, PseudoReward, Reward, Role};
+use sharp_plan::{Conditions, LearningTask, Method, Plan};
 use sharp_rl::{
     Actor, Environment, Evaluation, StopRule, Stream, TrainError, TrainSettings, evaluate, train,
 };
+use sharp_sim::RobotState;
 use sharp_space::Seed;
 
 /// Success that counts as learnt, share of episodes.
@@ -35,7 +37,7 @@ const JUDGE_EVERY: u64 = 1_000;
 /// Episodes of a look, and further ones where these suffice.
 const EPISODES: [usize; 2] = [20, 200];
 /// States to begin in: as many as the planner draws.
-const STARTS: usize = 256;
+const STATES: usize = 256;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -44,95 +46,105 @@ fn main() -> Outcome<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [map, plan, rest @ ..] = &arguments[..] else { return Err(usage.into()) };
     let grid = sharp_maps::load(map, &sharp_maps::LoadOptions::default())?.grid;
-    let course = Course::new(Plan::load(Path::new(plan), grid)?)?;
+    let peer = PeerTask::new(Plan::load(Path::new(plan), grid)?)?;
     let mut report = match rest.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["serve", seed] => return serve(course.paper_task(Seed(seed.parse()?)), Seed(seed.parse()?)),
-        ["paper", seed, limit] => course.paper(Seed(seed.parse()?), limit.parse()?)?,
-        ["scratch", seed, limit] => course.scratch(Seed(seed.parse()?), limit.parse()?)?,
-        ["fast", seed] => course.fast(Seed(seed.parse()?))?,
+        ["serve", seed] => return serve(peer.paper_task(Seed(seed.parse()?)), Seed(seed.parse()?)),
+        ["paper", seed, limit] => peer.paper(Seed(seed.parse()?), limit.parse()?)?,
+        ["scratch", seed, limit] => peer.scratch(Seed(seed.parse()?), limit.parse()?)?,
+        ["fast", seed] => peer.fast(Seed(seed.parse()?))?,
         _ => return Err(usage.into()),
     };
-    report["option"] = json!(course.leg.id.to_string());
-    report["length_m"] = json!(course.leg.guide.length_m());
+    report["option"] = json!(peer.option.id.to_string());
+    report["length_m"] = json!(peer.option.guide.length_m());
     println!("{report}");
     Ok(())
 }
 
 /// The option with all that its tasks are made of.
-struct Course {
+struct PeerTask {
     plan: Plan,
-    leg: Arc<Leg>,
-    next: Option<Arc<Leg>>,
-    starts: Arc<Starts>,
+    conditions: Conditions,
+    option: Arc<GuidedOption>,
+    next: Option<Arc<GuidedOption>>,
+    states: Arc<InitialStates>,
 }
 
-impl Course {
+impl PeerTask {
     fn new(plan: Plan) -> Outcome<Self> {
-        let legs = &plan.solution.legs;
-        let length_m = |index: &usize| legs[*index].leg.guide.length_m();
-        let options = (0..legs.len()).filter(|&index| legs[index].leg.id.role() == Role::Option);
+        let steps = &plan.solution.steps;
+        let length_m = |index: &usize| steps[*index].option.guide.length_m();
+        let options = (0..steps.len()).filter(|&index| steps[index].option.id.role() == Role::Option);
         let index = options.max_by(|a, b| length_m(a).total_cmp(&length_m(b)));
         let index = index.ok_or("the plan has no option")?;
-        let leg = Arc::clone(&legs[index].leg);
-        let next = legs.get(index + 1).map(|planned| Arc::clone(&planned.leg));
-        let starts = Starts::spread(&plan.workspace, &leg, &StartSpread::default(), STARTS, plan.seed);
-        Ok(Self { leg, next, starts: Arc::new(starts), plan })
+        let option = Arc::clone(&steps[index].option);
+        let next = steps.get(index + 1).map(|step| Arc::clone(&step.option));
+        let states = InitialStates::spread(&plan.world, &option, &StateSpread::default(), STATES, plan.seed);
+        let conditions = Conditions::new(&plan.world, plan.noise.clone());
+        Ok(Self { option, next, states: Arc::new(states), conditions, plan })
     }
 
-    fn task(&self, form: Form, reward: RewardMode, seed: Seed) -> LegTask {
-        let legs = (Arc::clone(&self.leg), self.next.clone());
-        let noise = (&self.plan.noise, seed);
-        LegTask::new(&self.plan.workspace, legs, form, reward, Arc::clone(&self.starts), noise)
+    fn task(&self, interface: PolicyInterface, reward: Arc<dyn Reward>, seed: Seed) -> OptionTask {
+        let scenario = Scenario {
+            world: self.plan.world.clone(),
+            simulator: self.conditions.simulator.fork(),
+            noise: self.plan.noise.clone(),
+            links: Arc::new([Link::new(Arc::clone(&self.option), self.next.clone())]),
+            interface,
+            reward,
+            start: RobotState::at_rest(self.option.guide.start()),
+        };
+        OptionTask::new(Arc::new(SingleOption { scenario, states: Arc::clone(&self.states) }), seed)
     }
 
     /// The paper's observation, action and reward.
-    fn paper_task(&self, seed: Seed) -> LegTask {
-        let form = Form::Absolute { reach_m: self.plan.workspace.robot.waypoint_reach_m };
-        self.task(form, RewardMode::Paper(PseudoReward::default()), seed)
+    fn paper_task(&self, seed: Seed) -> OptionTask {
+        let interface = PolicyInterface::Absolute { reach_m: self.plan.world.robot.waypoint_reach_m };
+        self.task(interface, Arc::new(PseudoReward::default()), seed)
     }
 
     fn paper(&self, seed: Seed, limit_s: f64) -> Result<Value, TrainError> {
         let tasks = vec![self.paper_task(seed.child("environment", 0))];
-        let settings = LearnSettings::new(LearningMode::Paper).train;
+        let settings = TrainSettings::default();
         learn(tasks, self.paper_task(seed.child("judge", 0)), settings, seed, limit_s)
     }
 
     /// A correction in the guide's frame, learnt on this option alone.
     fn scratch(&self, seed: Seed, limit_s: f64) -> Result<Value, TrainError> {
-        let workspace = &self.plan.workspace;
-        let form = prior::form(&workspace.robot, Expectation::new(&self.plan.noise, 1.0));
-        let task = |name, index| {
-            self.task(form, RewardMode::Shaped(ShapedReward::default()), seed.child(name, index))
-        };
+        let Plan { world, noise, .. } = &self.plan;
+        let interface = prior_interface(&world.robot, PolicyContext::new(noise, 1.0));
+        let task =
+            |name, index| self.task(interface, Arc::new(ProgressReward::default()), seed.child(name, index));
         let tasks = (0..16).map(|index| task("environment", index)).collect();
         let settings = TrainSettings::fast().with(|train| train.sac.zero_last_actor_layer = true);
         learn(tasks, task("judge", 0), settings, seed, limit_s)
     }
 
-    /// What a plan does for the option: candidates, certificates, training where none suffices.
+    /// What a plan does for the option: candidates, estimates, training where none suffices.
     fn fast(&self, seed: Seed) -> Outcome<Value> {
-        let settings = LearnSettings::new(LearningMode::Fast);
-        let lesson = Lesson {
-            workspace: &self.plan.workspace,
-            leg: &self.leg,
+        let method = Method::fast();
+        let task = LearningTask {
+            world: &self.plan.world,
+            conditions: &self.conditions,
+            option: &self.option,
             next: self.next.as_ref(),
             tail: &[],
-            starts: Arc::clone(&self.starts),
-            noise: &self.plan.noise,
-            settings: &settings,
+            states: Arc::clone(&self.states),
+            wanted_success: method.option_success,
+            failure_cost_s: method.failure_cost_s,
+            estimate_episodes: method.estimate_episodes,
             seed,
         };
         let clock = Clock::start();
-        let learnt = lesson.learn(&|| false).map_err(|failure| format!("{failure:?}"))?;
-        let best = learnt.verified.rate();
+        let learnt = method.learner.learn(&task, &|| false).map_err(|failure| format!("{failure:?}"))?;
+        let best = learnt.estimate.count.rate();
         Ok(clock.report(best >= WANTED, best, (learnt.env_steps, learnt.gradient_steps), &[]))
     }
 }
 
 /// Trains until [`judge`] is content, the steps of `settings` are used up or `limit_s` have passed.
 fn learn(
-    mut tasks: Vec<LegTask>,
-    judged: LegTask,
+    mut tasks: Vec<OptionTask>,
+    judged: OptionTask,
     settings: TrainSettings,
     seed: Seed,
     limit_s: f64,
@@ -167,13 +179,13 @@ fn learn(
 
 /// The success rate of the most likely actions: over the first episodes where it is too low, and
 /// otherwise over many fresh ones, because the best of many short looks is lucky.
-fn judge(task: &mut [LegTask], actor: &Actor, rng: &mut Stream) -> Result<f64, TrainError> {
+fn judge(task: &mut [OptionTask], actor: &Actor, rng: &mut Stream) -> Result<f64, TrainError> {
     let [few, many] = EPISODES;
     let first = evaluate(task, actor, few, rng)?.success_rate();
     if first < WANTED {
         return Ok(first);
     }
-    // A policy that held at first is worth no more than what it holds then.
+    // A policy that succeeded at first is worth no more than what it does then.
     evaluate(task, actor, many, rng).map(|second: Evaluation| second.success_rate().min(first))
 }
 
@@ -217,7 +229,7 @@ fn cpu_seconds() -> f64 {
 /// follows. The request `r` begins an episode and is answered by the observation; the request `s`
 /// with the components of an action makes a step and is answered by the observation, the reward and
 /// a byte: 1 for terminated, 2 for truncated, 4 for success. Components and rewards are `f32`.
-fn serve(mut task: LegTask, seed: Seed) -> Outcome<()> {
+fn serve(mut task: OptionTask, seed: Seed) -> Outcome<()> {
     let (mut requests, mut answers) = (std::io::stdin().lock(), std::io::stdout().lock());
     let spec = task.spec();
     let (mut observation, mut action) = (vec![0.0; spec.observation_len], vec![0.0_f32; spec.action_len]);

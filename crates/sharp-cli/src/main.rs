@@ -8,7 +8,6 @@
 mod args;
 mod commands;
 mod curves;
-mod evaluation;
 mod geojson;
 mod input;
 mod jobs;

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
+use sharp_bench::{ReportError, ResultError};
 use sharp_draw::PngError;
 use sharp_maps::MapError;
 use sharp_plan::{FileError, SolveError};
@@ -109,6 +110,19 @@ impl From<SolveError> for Failure {
             SolveError::File(error) => error.into(),
             error => Self::new("NO_FREE_SPACE", error),
         }
+    }
+}
+
+impl From<ResultError> for Failure {
+    fn from(error: ResultError) -> Self {
+        Self::new("FILE_INVALID", error)
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        let code = if matches!(error, ReportError::Drawing(_)) { "FAILED" } else { "FILE_INVALID" };
+        Self::new(code, error)
     }
 }
 

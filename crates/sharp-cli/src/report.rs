@@ -1,6 +1,7 @@
 //! The objects that `--json` prints. Keys are a contract: once printed, a key keeps its meaning.
 
 use serde::Serialize;
+use sharp_bench::{DecisionTimes, Reuse, SolveTimes};
 use sharp_drive::{EpisodeEnd, SuccessCount};
 use sharp_guide::Role;
 use sharp_plan::{Execution, Plan, PlannedOption};
@@ -85,40 +86,11 @@ impl LegReport {
     }
 }
 
-#[derive(Clone, Copy, Debug, Serialize, serde::Deserialize)]
-pub(crate) struct Reuse {
-    pub(crate) uses: usize,
-    pub(crate) reused: usize,
-}
-
 #[derive(Debug, Serialize)]
 pub(crate) struct Predicted {
     pub(crate) success: f64,
     pub(crate) lower95: f64,
     pub(crate) sim_time_s: f64,
-}
-
-#[derive(Clone, Copy, Debug, Default, Serialize, serde::Deserialize)]
-pub(crate) struct SolveTimes {
-    pub(crate) load: f64,
-    pub(crate) regions: f64,
-    pub(crate) abstraction: f64,
-    pub(crate) search: f64,
-    pub(crate) guide: f64,
-    pub(crate) learn: f64,
-    pub(crate) verify: f64,
-    /// What one execution of a baseline plans before and while it drives.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub(crate) plan: f64,
-    /// Simulating all executions; no part of the total of solving.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub(crate) drive: f64,
-    pub(crate) total: f64,
-}
-
-/// Serde asks with a reference.
-fn is_zero(seconds: &f64) -> bool {
-    *seconds == 0.0
 }
 
 impl From<&Stopwatch> for SolveTimes {
@@ -183,13 +155,6 @@ impl SolveReport {
         self.plan_dir = Some(plan_dir.display().to_string());
         self
     }
-}
-
-/// Wall time of one decision, microseconds.
-#[derive(Clone, Copy, Debug, Default, Serialize, serde::Deserialize)]
-pub(crate) struct DecisionTimes {
-    pub(crate) p50: f64,
-    pub(crate) p99: f64,
 }
 
 /// `sharp.run/1`.

@@ -148,12 +148,12 @@ fn suite(folder: &Path, golden: &mut BTreeMap<String, String>) {
     for line in text.lines() {
         let mut row: Value = serde_json::from_str(line).expect("JSON");
         let entries = row.as_object_mut().expect("an object");
-        for key in ["time_s", "decision_us", "machine", "version"] {
+        for key in ["time_s", "decision_us", "machine", "version", "job"] {
             entries.remove(key).unwrap_or_else(|| panic!("results name {key}"));
         }
-        let name = entries.remove("job").expect("results name their job");
-        let problem = entries.get("problem").expect("results name their problem").clone();
-        golden.insert(format!("row {} {problem}", name.as_str().unwrap_or_default()), row.to_string());
+        let word = |key: &str| row[key].to_string().replace('"', "");
+        let name = ["method", "env", "robot", "options", "problem"].map(word).join(" ");
+        golden.insert(format!("row {name}"), row.to_string());
     }
 }
 

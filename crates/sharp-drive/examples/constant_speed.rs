@@ -4,7 +4,7 @@
 
 use sharp_drive::conformance::check_policy;
 use sharp_drive::{
-    Command, Episode, EpisodeEnd, EpisodeRules, Policy, RouteController, Situation, Wall, World,
+    Command, Episode, EpisodeEnd, EpisodeRules, Policy, RouteController, Situation, Supervisor, World,
 };
 use sharp_guide::GuidePath;
 use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
@@ -48,7 +48,7 @@ fn main() {
     let mut episode = Episode::new(vehicle, EpisodeRules::default().with_time_limit_s(60.0));
     episode.begin(start, Seed(1), 0);
     let mut controller = RouteController::new(&world, guide, Box::new(policy), start, &NoiseModel::nominal());
-    assert_eq!(episode.drive(&mut controller, &Wall::silent()), EpisodeEnd::Reached);
+    assert_eq!(episode.drive(&mut controller, &Supervisor::silent()), EpisodeEnd::Reached);
     let record = episode.record();
     assert!((10.0..20.0).contains(&record.time_s), "{} s for {} m", record.time_s, record.path_m);
 }

@@ -7,7 +7,7 @@ use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::Seed;
 
 use crate::automaton::{Automaton, Link, Visit};
-use crate::episode::{Controller, Decision, Episode, EpisodeEnd, Motion, Wall};
+use crate::episode::{Controller, Decision, Episode, EpisodeEnd, Motion, Supervisor};
 use crate::policy::{OptionPolicy, Policy};
 use crate::situation::Observation;
 use crate::world::World;
@@ -61,7 +61,7 @@ impl Chain {
         let observation = self.first(start, episode.vehicle().noise());
         let automaton = Automaton::new(Arc::clone(&self.links), observation);
         let mut controller = ChainController { world, policies: &mut self.policies, automaton, entered: 0 };
-        let end = episode.drive(&mut controller, &Wall::silent());
+        let end = episode.drive(&mut controller, &Supervisor::silent());
         let arrival = controller.automaton.observation().state;
         ChainRun { visits: controller.automaton.visits().to_vec(), arrival, end }
     }
@@ -130,6 +130,7 @@ impl ChainRun {
 
 #[cfg(test)]
 mod tests {
+    use sharp_sim::SimulatorKind;
     use sharp_space::Pose;
 
     use super::*;
@@ -145,8 +146,8 @@ mod tests {
             options.iter().map(|option| Driver::new(option, &policy, None)).collect();
         let noise = NoiseModel::none();
         let start = RobotState::at_rest(options[0].guide.start());
-        let trial = MonteCarlo::new(&world, &*world.simulator(sharp_sim::SimulatorKind::Kinematic), &noise)
-            .with_episodes(1);
+        let simulator = world.simulator(SimulatorKind::Kinematic);
+        let trial = MonteCarlo::new(&world, &*simulator, &noise).with_episodes(1);
         let run = trial.runs(&drivers, start).remove(0);
         assert_eq!(run.end, EpisodeEnd::Reached, "{run:?}");
         assert!((0..options.len()).all(|index| run.passed(index)), "every option succeeded");

@@ -6,7 +6,7 @@ use sharp_space::{OccupancyGrid, Pose, Seed};
 use thiserror::Error;
 
 use crate::command::Command;
-use crate::episode::{Controller, Decision, Episode, EpisodeEnd, EpisodeRules, Motion, Wall};
+use crate::episode::{Controller, Decision, Episode, EpisodeEnd, EpisodeRules, Motion, Supervisor};
 use crate::policy::Policy;
 use crate::route::RouteController;
 use crate::world::World;
@@ -81,7 +81,7 @@ fn drive(
     episode.begin(start, Seed(1), 0);
     let inner = RouteController::new(world, guide.clone(), policy.fork(), start, noise);
     let mut controller = Recorder { inner, commands: Vec::new() };
-    let end = episode.drive(&mut controller, &Wall::silent());
+    let end = episode.drive(&mut controller, &Supervisor::silent());
     (end, controller.commands)
 }
 

@@ -169,14 +169,14 @@ pub struct EpisodeRecord {
 
 /// The world outside the simulation: its clock, and its wish to stop.
 #[derive(Clone, Copy)]
-pub struct Wall<'a> {
+pub struct Supervisor<'a> {
     /// Wall time, microseconds.
     pub clock_us: &'a (dyn Fn() -> f64 + Sync),
     /// Whether to give up; an episode that runs then counts as timed out.
     pub should_stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl Wall<'static> {
+impl Supervisor<'static> {
     /// No clock, and no wish to stop.
     #[must_use]
     pub fn silent() -> Self {
@@ -184,9 +184,9 @@ impl Wall<'static> {
     }
 }
 
-impl fmt::Debug for Wall<'_> {
+impl fmt::Debug for Supervisor<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Wall").finish_non_exhaustive()
+        f.debug_struct("Supervisor").finish_non_exhaustive()
     }
 }
 
@@ -267,9 +267,9 @@ impl Episode {
     }
 
     /// Lets `controller` drive until the episode ends.
-    pub fn drive(&mut self, controller: &mut dyn Controller, wall: &Wall<'_>) -> EpisodeEnd {
-        while self.record.time_s < self.rules.time_limit_s && !(wall.should_stop)() {
-            let motion = match self.decide(controller, wall) {
+    pub fn drive(&mut self, controller: &mut dyn Controller, supervisor: &Supervisor<'_>) -> EpisodeEnd {
+        while self.record.time_s < self.rules.time_limit_s && !(supervisor.should_stop)() {
+            let motion = match self.decide(controller, supervisor) {
                 Decision::Drive(command) => self.act(command),
                 Decision::BackOff => self.back_off(),
                 Decision::Reached => return EpisodeEnd::Reached,
@@ -284,10 +284,10 @@ impl Episode {
     }
 
     /// Lets `controller` plan and decide, and counts the wall time of both.
-    fn decide(&mut self, controller: &mut dyn Controller, wall: &Wall<'_>) -> Decision {
-        let before_us = (wall.clock_us)();
+    fn decide(&mut self, controller: &mut dyn Controller, supervisor: &Supervisor<'_>) -> Decision {
+        let before_us = (supervisor.clock_us)();
         let readiness = controller.prepare();
-        let prepared_us = (wall.clock_us)();
+        let prepared_us = (supervisor.clock_us)();
         if let Readiness::Planned { nominal_time_s } = readiness {
             let is_first = self.record.plans == 0;
             if let Some(factor) = self.rules.limit_by_plan.filter(|_| is_first) {
@@ -298,7 +298,7 @@ impl Episode {
         }
         let decision = controller.decide();
         if self.rules.keep_trace {
-            self.record.decisions_us.push((wall.clock_us)() - prepared_us);
+            self.record.decisions_us.push((supervisor.clock_us)() - prepared_us);
         }
         decision
     }
@@ -343,7 +343,7 @@ mod tests {
         let mut episode = Episode::new(vehicle, rules);
         episode.begin(RobotState::at_rest(Pose::new(7.0, 1.0, 0.0)), Seed(1), 0);
         let mut bull = Bull { speed_mps, bumped: false, backed_off: 0 };
-        let end = episode.drive(&mut bull, &Wall::silent());
+        let end = episode.drive(&mut bull, &Supervisor::silent());
         (end, episode.into_record(), bull.backed_off)
     }
 

@@ -7,7 +7,7 @@
 //! ([`MonteCarlo`]), learning ([`OptionTask`]) and execution all use these, so that what is predicted is what runs.
 //!
 //! ```
-//! use sharp_drive::{Episode, EpisodeEnd, EpisodeRules, Follower, RouteController, Wall, World};
+//! use sharp_drive::{Episode, EpisodeEnd, EpisodeRules, Follower, RouteController, Supervisor, World};
 //! use sharp_guide::GuidePath;
 //! use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
 //! use sharp_space::{OccupancyGrid, Pose, Seed};
@@ -23,7 +23,7 @@
 //! episode.begin(start, Seed(1), 0);
 //! let policy = Box::new(Follower::cautious(&world.robot));
 //! let mut controller = RouteController::new(&world, route, policy, start, &noise);
-//! assert_eq!(episode.drive(&mut controller, &Wall::silent()), EpisodeEnd::Reached);
+//! assert_eq!(episode.drive(&mut controller, &Supervisor::silent()), EpisodeEnd::Reached);
 //! ```
 
 pub mod conformance;
@@ -59,8 +59,8 @@ pub use chain::{ChainRun, Driver};
 pub use command::Command;
 pub use count::SuccessCount;
 pub use episode::{
-    Controller, Decision, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Motion, Readiness,
-    TIME_LIMIT_MIN_S, Wall,
+    Controller, Decision, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Motion, Readiness, Supervisor,
+    TIME_LIMIT_MIN_S,
 };
 pub use estimate::{FAILURE_COST_S, MonteCarlo, SuccessEstimate};
 pub use follower::{Follower, SteeringRule};

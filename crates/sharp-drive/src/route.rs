@@ -161,7 +161,7 @@ mod tests {
 
     use super::*;
     use crate::command::Command;
-    use crate::episode::{Episode, EpisodeEnd, EpisodeRules, Wall};
+    use crate::episode::{Episode, EpisodeEnd, EpisodeRules, Supervisor};
     use crate::follower::Follower;
     use crate::test_worlds::{hall, straight};
 
@@ -175,7 +175,7 @@ mod tests {
         episode.begin(start, Seed(1), 0);
         let policy = Box::new(Follower::cautious(&world.robot));
         let mut controller = RouteController::new(&world, route, policy, start, &NoiseModel::none());
-        assert_eq!(episode.drive(&mut controller, &Wall::silent()), EpisodeEnd::Reached);
+        assert_eq!(episode.drive(&mut controller, &Supervisor::silent()), EpisodeEnd::Reached);
         assert_eq!(episode.record().plans, 1, "the path at hand is a plan");
     }
 

@@ -11,9 +11,9 @@ const SPACING_M: f64 = 0.1;
 
 /// Drives straight from start to goal, after a turn in place where that is needed.
 #[derive(Debug)]
-struct StraightLine;
+struct StraightGuide;
 
-impl GuidePlanner for StraightLine {
+impl GuidePlanner for StraightGuide {
     fn plan(
         &self,
         request: &GuideRequest<'_>,
@@ -43,12 +43,12 @@ impl GuidePlanner for StraightLine {
 }
 
 fn main() {
-    assert_eq!(check_guide_planner(&StraightLine), Ok(()));
+    assert_eq!(check_guide_planner(&StraightGuide), Ok(()));
     let grid = OccupancyGrid::from_ascii(0.5, &["....................."; 6].join("\n")).expect("a drawing");
     let checker = FootprintChecker::new(&grid, Footprint::rectangle(0.5, 0.335).expect("a sound outline"));
     let end = |x| GuideEnd { position: Point::new(x, 1.5), heading: None };
     let request = GuideRequest { start: end(1.5), goal: end(8.5), allowed: &|_| true };
     let robot = GuideRobot::new(&checker, Steering::RotateTranslate);
-    let guide = StraightLine.plan(&request, &robot, &mut Seed(1).stream("guide", 0)).expect("an empty hall");
+    let guide = StraightGuide.plan(&request, &robot, &mut Seed(1).stream("guide", 0)).expect("an empty hall");
     assert!((guide.length_m() - 7.0).abs() < 1e-9, "{} m", guide.length_m());
 }

@@ -24,7 +24,7 @@ const STEPS: [(isize, isize); 8] = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-
 /// A metre costs 1 + `weight` · s², where s runs from 0 with comfortable room to 1 with the least.
 /// Ties go to the lower cell.
 pub(crate) fn ridge(mask: &TraversableMask<'_>, start: Cell, goal: Cell, weight: f64) -> Option<Vec<Cell>> {
-    let mut search = Search::new(mask, goal, weight);
+    let mut search = RidgeSearch::new(mask, goal, weight);
     search.push(start, 1.0, 0);
     while let Some(cell) = search.pop() {
         if cell == goal {
@@ -35,7 +35,7 @@ pub(crate) fn ridge(mask: &TraversableMask<'_>, start: Cell, goal: Cell, weight:
     None
 }
 
-struct Search<'a> {
+struct RidgeSearch<'a> {
     mask: &'a TraversableMask<'a>,
     frame: &'a GridFrame,
     goal: Cell,
@@ -49,7 +49,7 @@ struct Search<'a> {
     open: BinaryHeap<Reverse<(u32, u32)>>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> RidgeSearch<'a> {
     fn new(mask: &'a TraversableMask<'a>, goal: Cell, weight: f64) -> Self {
         let frame = mask.frame();
         Self {

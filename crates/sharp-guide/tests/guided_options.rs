@@ -2,7 +2,9 @@
 
 mod worlds;
 
-use sharp_guide::{Role, Target};
+use sharp_guide::{
+    GuidedOption, Place, ProgressReward, PseudoReward, Reward, Role, StepEvents, Target, Transition,
+};
 use sharp_options::OptionKind;
 use sharp_rbvd::StateId;
 use sharp_space::{Heading, Pose};
@@ -63,4 +65,35 @@ fn the_horizon_grows_with_the_guide() {
             assert!((9.99..11.01).contains(&beyond), "{}: {beyond} actions beyond three times", option.id);
         }
     }
+}
+
+/// What `reward` pays for an action from `from` to `to`.
+fn paid(reward: &dyn Reward, option: &GuidedOption, (from, to): (&Pose, &Pose)) -> f64 {
+    let before = option.guide.project(from.position, 0.0);
+    let after = option.guide.project(to.position, before.arc_m);
+    let place = option.place(to);
+    let (success, stray) = (place == Place::Termination, place == Place::Astray);
+    reward.reward(&Transition {
+        option,
+        pose: to,
+        progress_m: after.arc_m - before.arc_m,
+        deviation_m: after.cross_track_m.abs() - before.cross_track_m.abs(),
+        events: StepEvents { success, contact: false, stray },
+    })
+}
+
+#[test]
+fn rewards_know_their_three_places() {
+    let option = &Drawn::new(HALL, OptionKind::Centroid).plan(&["c:0-1"], along())[0];
+    let (start, end) = (option.guide.start(), option.guide.end());
+    let middle = option.guide.pose_at(0.5 * option.guide.length_m());
+    let (paper, progress) = (PseudoReward::default(), ProgressReward::default());
+    assert_eq!(paid(&paper, option, (&start, &end)), 1000.0, "r_t");
+    assert_eq!(paid(&paper, option, (&start, &Pose::new(9.0, 2.0, 0.0))), -100.0, "r_p");
+    let (near, far) = (paid(&paper, option, (&start, &middle)), paid(&paper, option, (&start, &start)));
+    assert!(far < near && near < 0.0, "nearer the end is better: {near} against {far}");
+    let (ahead, back) =
+        (paid(&progress, option, (&start, &middle)), paid(&progress, option, (&middle, &start)));
+    assert!(ahead > 0.0 && back < 0.0, "progress pays {ahead}, going back {back}");
+    assert!(!paper.contact_ends() && progress.contact_ends(), "the paper lets the robot bump and go on");
 }

@@ -15,7 +15,7 @@ use crate::files::FileError;
 use crate::learn::learn_missing;
 use crate::library::OptionLibrary;
 use crate::policies::Policies;
-use crate::problem::Problem;
+use crate::problem::PlanningProblem;
 use crate::query::Phase;
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
@@ -42,7 +42,7 @@ pub enum Outcome {
 /// # Errors
 /// Returns an error if the library cannot be written.
 pub fn solve(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
 ) -> Result<Outcome, FileError> {
@@ -53,11 +53,11 @@ pub fn solve(
 
 /// The algorithm itself, at most 60 lines.
 fn algorithm_1(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
 ) -> Result<Outcome, FileError> {
-    let Problem { world, method, query, seed, monitor, .. } = *problem;
+    let PlanningProblem { world, method, query, seed, monitor, .. } = *problem;
     monitor.phase(Phase::Search);
     // 8: s_i, s_g <- get_abstract_states(x_i, x_g)
     let known = Policies::guides(library);
@@ -116,7 +116,7 @@ fn names(plan: &[Arc<GuidedOption>]) -> Vec<LegId> {
 
 /// The cheapest plan by all that is known by now.
 fn cheapest(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     search: &mut Search<'_>,
     policies: &Policies<'_>,
 ) -> Option<Vec<Arc<GuidedOption>>> {
@@ -124,7 +124,7 @@ fn cheapest(
     search.plan(&cost_s, problem.monitor)
 }
 
-fn join(problem: &Problem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOption>> {
+fn join(problem: &PlanningProblem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOption>> {
     if !problem.method.join_guides {
         return plan;
     }
@@ -132,7 +132,11 @@ fn join(problem: &Problem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOp
     join_guides(plan, problem.query.start, &robot, &problem.method.search.guide)
 }
 
-fn has_weak_option(problem: &Problem<'_>, plan: &[Arc<GuidedOption>], policies: &Policies<'_>) -> bool {
+fn has_weak_option(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+) -> bool {
     let is_weak = |option: &Arc<GuidedOption>| {
         let SuccessEstimate { count, .. } = policies.learnt(option.id).estimate;
         count.episodes > 0 && count.rate() < problem.method.usable_success
@@ -159,5 +163,122 @@ fn describe_no_plan(search: &Search<'_>) -> String {
             format!("{nothing}; {count} options have no guide, among them {id}: {reason}")
         }
         None => nothing.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use sharp_drive::{NetworkPolicy, OptionPolicy, PolicyContext, prior_interface};
+    use sharp_options::OptionKind;
+    use sharp_sim::NoiseModel;
+    use sharp_space::{Pose, Seed};
+
+    use super::*;
+    use crate::conditions::Conditions;
+    use crate::learn::{LearntPolicy, Selection};
+    use crate::method::{Method, RepairSettings};
+    use crate::query::{Monitor, Query};
+    use crate::test_worlds::{HALL, SEALED, along, world};
+
+    /// The default method with fewer episodes.
+    fn quick() -> Method {
+        let screening_episodes = 50;
+        let fast = Method::fast().with_episodes(200, 100, 100);
+        let repair = RepairSettings { screening_episodes, ..fast.repair };
+        let learner = Selection { screening_episodes, ..Selection::default() };
+        Method { learner: Arc::new(learner), repair, ..fast }
+    }
+
+    /// Solves `query` in `drawing` under nominal noise.
+    fn solved(
+        (drawing, kind): (&str, OptionKind),
+        query: Query,
+        method: &Method,
+        monitor: &dyn Monitor,
+    ) -> (Outcome, OptionLibrary) {
+        let (world, abstraction) = world(drawing, kind);
+        let conditions = Conditions::new(&world, NoiseModel::nominal());
+        let problem =
+            PlanningProblem { world: &world, method, conditions: &conditions, query, seed: Seed(1), monitor };
+        let mut library = OptionLibrary::in_memory();
+        let outcome = solve(&problem, &abstraction, &mut library).expect("no files");
+        (outcome, library)
+    }
+
+    /// Notes what happens and stops when told to.
+    #[derive(Default)]
+    struct Notes {
+        phases: Mutex<Vec<Phase>>,
+        learnt: Mutex<Vec<LegId>>,
+        stops: bool,
+    }
+
+    impl Monitor for Notes {
+        fn phase(&self, phase: Phase) {
+            self.phases.lock().expect("no other panic").push(phase);
+        }
+
+        fn learnt(&self, option: &GuidedOption, _: &LearntPolicy) {
+            self.learnt.lock().expect("no other panic").push(option.id);
+        }
+
+        fn should_stop(&self) -> bool {
+            self.stops
+        }
+    }
+
+    #[test]
+    fn a_hall_is_solved_and_the_options_stay_in_the_library() {
+        let notes = Notes::default();
+        let (outcome, library) = solved((HALL, OptionKind::Centroid), along(), &quick(), &notes);
+        let Outcome::Solved(solution) = outcome else { panic!("{outcome:?}") };
+        assert_eq!(solution.steps.len(), 4, "first, two options, last");
+        assert_eq!(solution.reuse(), (2, 0), "nothing was there before");
+        assert!(solution.predicted.rate() > 0.9, "an open hall is crossed {:?}", solution.predicted);
+        assert_eq!(library.len(), 2, "only options are kept");
+        let phases = notes.phases.into_inner().expect("no other panic");
+        assert_eq!((phases.first(), phases.last()), (Some(&Phase::Search), Some(&Phase::Done)), "{phases:?}");
+        assert!(notes.learnt.into_inner().expect("no other panic").len() >= 4, "every option was told");
+    }
+
+    #[test]
+    fn the_prior_alone_is_estimated_and_neither_trained_nor_repaired() {
+        let method = Method::prior().with_episodes(100, 100, 1000);
+        let (outcome, _) = solved((HALL, OptionKind::Centroid), along(), &method, &());
+        let Outcome::Solved(solution) = outcome else { panic!("{outcome:?}") };
+        let context = PolicyContext::new(&NoiseModel::nominal(), 0.5);
+        let middle = prior_interface(&sharp_sim::RobotModel::husky(), context);
+        for PlannedOption { option, learnt, .. } in &solution.steps {
+            let OptionPolicy::Network(NetworkPolicy { interface, .. }) = &learnt.policy else {
+                panic!("{}: a follower", option.id)
+            };
+            assert_eq!(*interface, middle, "{}", option.id);
+            let effort = (learnt.estimate.count.episodes, learnt.gradient_steps);
+            assert_eq!(effort, (100, 0), "{}", option.id);
+        }
+        assert!(solution.predicted.rate() > 0.8, "an open hall is crossed {:?}", solution.predicted);
+    }
+
+    #[test]
+    fn no_plan_is_an_outcome_with_a_reason() {
+        let through = Query { start: Pose::new(2.0, 1.4, 0.0), goal: Pose::new(6.0, 1.4, 0.0) };
+        for (query, needle) in [
+            (through, "no sequence of options"),
+            (Query { start: Pose::new(-9.0, 0.0, 0.0), ..through }, "start lies in no abstract state"),
+            (Query { goal: Pose::new(-9.0, 0.0, 0.0), ..through }, "goal lies in no abstract state"),
+        ] {
+            let (outcome, _) = solved((SEALED, OptionKind::Interface), query, &quick(), &());
+            let Outcome::NoPlan(reason) = outcome else { panic!("{outcome:?}") };
+            assert!(reason.contains(needle), "{reason:?} does not say {needle:?}");
+        }
+    }
+
+    #[test]
+    fn a_stop_is_heard() {
+        let notes = Notes { stops: true, ..Notes::default() };
+        let (outcome, _) = solved((HALL, OptionKind::Centroid), along(), &quick(), &notes);
+        assert!(matches!(outcome, Outcome::Stopped), "{outcome:?}");
     }
 }

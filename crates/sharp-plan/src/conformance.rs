@@ -110,7 +110,10 @@ pub fn check_option_learner(learner: &dyn OptionLearner) -> Result<(), OptionLea
     }
 }
 
-fn learn(learner: &dyn OptionLearner, task: &LearningTask<'_>) -> Result<LearntPolicy, OptionLearnerViolation> {
+fn learn(
+    learner: &dyn OptionLearner,
+    task: &LearningTask<'_>,
+) -> Result<LearntPolicy, OptionLearnerViolation> {
     learner.learn(task, &|| false).map_err(|failure| OptionLearnerViolation::Failed(format!("{failure:?}")))
 }
 
@@ -202,7 +205,8 @@ mod tests {
             task: &LearningTask<'_>,
             _: &dyn LearningMonitor,
         ) -> Result<LearntPolicy, LearnFailure> {
-            let policy = OptionPolicy::Follower(Follower { speed_mps: 0.0, ..Follower::cautious(&task.world.robot) });
+            let policy =
+                OptionPolicy::Follower(Follower { speed_mps: 0.0, ..Follower::cautious(&task.world.robot) });
             let count = SuccessCount { episodes: self.episodes, successes: self.episodes };
             Ok(LearntPolicy::untrained(policy, SuccessEstimate { count, mean_time_s: 5.0 }))
         }

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_drive::{Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, SuccessCount, TIME_LIMIT_MIN_S, Wall};
+use sharp_drive::{
+    Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, SuccessCount, Supervisor, TIME_LIMIT_MIN_S,
+};
 use sharp_sim::{NoiseModel, RobotState, Simulator, SimulatorKind};
 use sharp_space::Seed;
 
@@ -70,13 +72,13 @@ pub fn run(plan: &Arc<Plan>, settings: &RunSettings, clock_us: &(dyn Fn() -> f64
         .with_trace();
     let vehicle = plan.world.vehicle(&*settings.simulator, &settings.noise, settings.contact_ends);
     let episode = Episode::new(vehicle, rules);
-    let wall = Wall { clock_us, ..Wall::silent() };
+    let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
     let start = RobotState::at_rest(plan.solution.query.start);
     let execute = |number: u32| {
         let mut episode = episode.clone();
         episode.begin(start, settings.seed, u64::from(number));
         let mut policy = ComposedPolicy::new(Arc::clone(plan), start, settings.recovery);
-        let end = episode.drive(&mut policy, &wall);
+        let end = episode.drive(&mut policy, &supervisor);
         Execution { end, record: episode.into_record(), events: policy.events() }
     };
     (0..settings.episodes).into_par_iter().map(execute).collect()

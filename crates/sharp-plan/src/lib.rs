@@ -65,7 +65,7 @@ pub use library::{FORMAT, OptionLibrary, StoredOption};
 pub use method::{LearningOrder, Method, RepairSettings, SearchSettings};
 pub use option_graph::{Candidate, OptionGraph};
 pub use plan_file::{AbstractionFile, Plan, map_hash};
-pub use problem::Problem;
+pub use problem::PlanningProblem;
 pub use query::{Monitor, Phase, Query};
 pub use search::{Search, Unplaced};
 pub use sharp::{Answer, Sharp, SolveError};

@@ -108,6 +108,13 @@ impl Default for SearchSettings {
     }
 }
 
+impl Default for Method {
+    /// [`Method::fast`].
+    fn default() -> Self {
+        Self::fast()
+    }
+}
+
 impl Method {
     /// The default: the cheapest policy at hand that succeeds often enough, guides with a safety margin that join
     /// smoothly, and repairs until the plan succeeds as wanted.

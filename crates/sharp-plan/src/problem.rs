@@ -9,7 +9,7 @@ use crate::query::{Monitor, Query};
 
 /// A problem, how it is to be solved, and who watches.
 #[derive(Clone, Copy)]
-pub struct Problem<'a> {
+pub struct PlanningProblem<'a> {
     /// Map and robot.
     pub world: &'a World,
     /// How it is solved.
@@ -24,9 +24,9 @@ pub struct Problem<'a> {
     pub monitor: &'a dyn Monitor,
 }
 
-impl std::fmt::Debug for Problem<'_> {
+impl std::fmt::Debug for PlanningProblem<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Problem")
+        f.debug_struct("PlanningProblem")
             .field("query", &self.query)
             .field("seed", &self.seed)
             .finish_non_exhaustive()

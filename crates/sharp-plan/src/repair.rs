@@ -10,7 +10,7 @@ use sharp_sim::RobotState;
 use crate::files::FileError;
 use crate::learn::{LearningTask, LearntPolicy, initial_states, successive_halving, task};
 use crate::policies::Policies;
-use crate::problem::Problem;
+use crate::problem::PlanningProblem;
 use crate::query::OptionMonitor;
 use crate::search::Search;
 use crate::verify::{drivers, of_option, of_plan, run_chain};
@@ -26,7 +26,7 @@ const GAIN_MIN: f64 = 0.003;
 
 /// A plan under repair, and where its options came from.
 pub(crate) struct Repair<'a> {
-    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) problem: &'a PlanningProblem<'a>,
     pub(crate) plan: &'a [Arc<GuidedOption>],
     pub(crate) search: &'a Search<'a>,
 }

@@ -17,7 +17,7 @@ use crate::files::FileError;
 use crate::library::OptionLibrary;
 use crate::method::Method;
 use crate::plan_file::{AbstractionFile, Plan, map_hash};
-use crate::problem::Problem;
+use crate::problem::PlanningProblem;
 use crate::query::{Monitor, Query};
 
 /// A robot in a building that solves problem after problem and keeps what it learns.
@@ -89,7 +89,7 @@ impl Sharp {
             family: Arc::new(sharp_options::InterfaceOptions),
             kind: OptionKind::Interface,
             settings,
-            method: Method::fast(),
+            method: Method::default(),
             conditions,
             library: OptionLibrary::in_memory(),
             built: None,
@@ -212,7 +212,7 @@ impl Sharp {
     pub fn solve(&mut self, query: Query, monitor: &dyn Monitor) -> Result<Answer, SolveError> {
         let abstraction = self.abstraction(monitor)?.clone();
         let Self { world, method, conditions, library, seed, .. } = self;
-        let problem = Problem { world, method, conditions, query, seed: *seed, monitor };
+        let problem = PlanningProblem { world, method, conditions, query, seed: *seed, monitor };
         Ok(match solve(&problem, &abstraction, library)? {
             Outcome::Solved(solution) => Answer::Solved(Box::new(Plan {
                 world: world.clone(),

@@ -164,3 +164,45 @@ pub fn prior_train_settings() -> TrainSettings {
         train.stop = StopRule::Never;
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_drive::{OptionTask, Prior};
+    use sharp_options::OptionKind;
+    use sharp_rl::conformance::check_environment;
+    use sharp_rl::{Environment, SacState, evaluate};
+
+    use super::*;
+    use crate::test_worlds::{HALL, along, world};
+
+    /// The plan along the hall.
+    fn along_the_hall() -> Vec<TrainingRoute> {
+        let (world, abstraction) = world(HALL, OptionKind::Interface);
+        training_routes(&world, &abstraction, &[along()], Seed(1))
+    }
+
+    #[test]
+    fn every_degree_of_caution_drives_through_a_hall() {
+        let (route, noise) = (&along_the_hall()[0], NoiseModel::nominal());
+        assert!(!route.is_empty() && route.len() == 3, "{} options", route.len());
+        let policies = Prior::shipped(&route.world.robot).candidates(&route.world.robot, &noise);
+        for policy in policies {
+            for estimate in route.estimate(&policy, &noise, 100, Seed(2)) {
+                assert!(estimate.count.rate() > 0.9, "{policy:?}: {estimate:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_episode_runs_on_over_its_hand_overs() {
+        let source = RouteScenarios::new(Arc::new(along_the_hall()), Arc::new(vec![NoiseModel::none()]));
+        let mut task = OptionTask::new(Arc::new(source), Seed(1));
+        let checked = check_environment(&mut task, &mut Seed(1).stream("check", 0));
+        assert_eq!(checked, Ok(()));
+        let mut rng = Seed(1).stream("networks", 0);
+        let actor = SacState::new(task.spec(), &prior_train_settings().sac, &mut rng).actor;
+        let all = evaluate(std::slice::from_mut(&mut task), &actor, 20, &mut rng).expect("a sound task");
+        assert_eq!(all.successes, 20, "without noise the base follower runs through: {all:?}");
+        assert!(all.mean_steps > 12.0, "more than an option at a time: {all:?}");
+    }
+}

@@ -8,7 +8,7 @@ use sharp_sim::RobotState;
 
 use crate::learn::LearntPolicy;
 use crate::policies::Policies;
-use crate::problem::Problem;
+use crate::problem::PlanningProblem;
 use crate::query::Query;
 
 /// A step of a solution.
@@ -63,7 +63,7 @@ pub(crate) fn drivers<'a>(plan: &[Arc<GuidedOption>], policies: &'a Policies<'_>
 
 /// Runs `drivers` from the start of `problem`; `purpose` names the random stream.
 pub(crate) fn run_chain(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     drivers: &[Driver<'_>],
     episodes: u32,
     purpose: &str,
@@ -74,7 +74,11 @@ pub(crate) fn run_chain(
 }
 
 /// Counts how often `plan` succeeds.
-pub(crate) fn verify(problem: &Problem<'_>, plan: &[Arc<GuidedOption>], policies: &Policies<'_>) -> Solution {
+pub(crate) fn verify(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+) -> Solution {
     let runs = run_chain(problem, &drivers(plan, policies), problem.method.verify_episodes, "verify");
     let planned = |(index, option): (usize, &Arc<GuidedOption>)| {
         let arrived = of_option(&runs, index);

@@ -5,10 +5,8 @@
 use std::sync::Arc;
 
 use sharp_sim::conformance::check_simulator;
-use sharp_sim::{
-    ActionSettings, NoiseModel, ObstacleMap, RobotModel, RobotState, Simulator, StepInfo, Vehicle,
-    WheelCommand,
-};
+use sharp_sim::{ActionSettings, NoiseModel, ObstacleMap, RobotModel, RobotState, Simulator};
+use sharp_sim::{StepInfo, Vehicle, WheelCommand};
 use sharp_space::{OccupancyGrid, Point, Pose, Seed, Vector};
 
 /// A body without inertia in its map.

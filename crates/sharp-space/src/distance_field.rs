@@ -53,6 +53,7 @@ impl DistanceField {
     }
 
     /// The frame of the grid it was made from.
+    #[inline]
     #[must_use]
     pub const fn frame(&self) -> &GridFrame {
         &self.frame
@@ -62,12 +63,14 @@ impl DistanceField {
     ///
     /// # Panics
     /// If `cell` lies outside the grid.
+    #[inline]
     #[must_use]
     pub fn at(&self, cell: Cell) -> f64 {
         f64::from(self.distances[self.frame.index(cell)])
     }
 
     /// Bilinear interpolation at `point`, metres; 0 outside the grid.
+    #[inline]
     #[must_use]
     pub fn sample(&self, point: Point) -> f64 {
         let g = self.frame.to_grid(point);

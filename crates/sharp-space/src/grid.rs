@@ -61,6 +61,7 @@ impl GridFrame {
     }
 
     /// The cell that contains `point`, or `None` outside the grid or for a point that is not finite.
+    #[inline]
     #[must_use]
     pub fn cell_at(&self, point: Point) -> Option<Cell> {
         let g = self.to_grid(point);
@@ -69,6 +70,7 @@ impl GridFrame {
     }
 
     /// `point` in units of cells from the lower-left corner (column direction, row direction).
+    #[inline]
     #[must_use]
     pub fn to_grid(&self, point: Point) -> Vector {
         self.origin.to_local(point) / self.resolution_m
@@ -94,6 +96,7 @@ impl GridFrame {
     }
 
     /// The position of `cell` in row-major order, the x axis running fastest.
+    #[inline]
     #[must_use]
     pub const fn index(&self, cell: Cell) -> usize {
         cell.row * self.width + cell.col

@@ -12,6 +12,7 @@ pub type Point = nalgebra::Point2<f64>;
 pub type Vector = nalgebra::Vector2<f64>;
 
 /// Returns `angle_rad` wrapped to (−π, π].
+#[inline]
 #[must_use]
 pub fn wrap_angle(angle_rad: f64) -> f64 {
     if angle_rad > -PI && angle_rad <= PI {
@@ -29,6 +30,7 @@ pub struct Heading(f64);
 
 impl Heading {
     /// Wraps `angle_rad` to (−π, π].
+    #[inline]
     #[must_use]
     pub fn new(angle_rad: f64) -> Self {
         Self(wrap_angle(angle_rad))
@@ -41,18 +43,21 @@ impl Heading {
     }
 
     /// The angle in (−π, π].
+    #[inline]
     #[must_use]
     pub const fn radians(self) -> f64 {
         self.0
     }
 
     /// The signed shortest turn from `self` to `other`, in (−π, π].
+    #[inline]
     #[must_use]
     pub fn turn_to(self, other: Self) -> f64 {
         wrap_angle(other.0 - self.0)
     }
 
     /// The unit vector that points this way.
+    #[inline]
     #[must_use]
     pub fn unit(self) -> Vector {
         let (sin, cos) = trig::sin_cos(self.0);
@@ -116,6 +121,7 @@ impl Pose {
     }
 
     /// Expresses the world point `point` in this pose's frame (x ahead, y to the left).
+    #[inline]
     #[must_use]
     pub fn to_local(&self, point: Point) -> Vector {
         let (sin, cos) = trig::sin_cos(self.heading.0);
@@ -124,6 +130,7 @@ impl Pose {
     }
 
     /// Expresses `local` (x ahead, y to the left) in the world frame.
+    #[inline]
     #[must_use]
     pub fn to_world(&self, local: Vector) -> Point {
         let (sin, cos) = trig::sin_cos(self.heading.0);
@@ -131,6 +138,7 @@ impl Pose {
     }
 
     /// Euclidean distance of the positions, metres; headings do not count.
+    #[inline]
     #[must_use]
     pub fn distance_m(&self, other: &Self) -> f64 {
         (self.position - other.position).norm()

@@ -12,7 +12,7 @@ mod tests;
 pub use mpc::Mpc;
 pub use route::RoutePlanner;
 pub use rrt::Rrt;
-pub use sac::{Sac, SacBudget};
+pub use sac::{FlatSac, SacBudget};
 pub use track::Track;
 
 use sharp_drive::World;

@@ -34,7 +34,7 @@ pub struct SacBudget {
 
 /// The baseline `sac`.
 #[derive(Clone, Debug)]
-pub struct Sac<'a> {
+pub struct FlatSac<'a> {
     world: &'a World,
     query: Query,
     budget: SacBudget,
@@ -43,7 +43,7 @@ pub struct Sac<'a> {
     updates: u64,
 }
 
-impl<'a> Sac<'a> {
+impl<'a> FlatSac<'a> {
     /// Learns until 20 episodes return 500 on average, the budget is used up, or `observer` breaks off;
     /// then the best policy so far is kept.
     ///
@@ -79,7 +79,7 @@ impl<'a> Sac<'a> {
     }
 }
 
-impl Contender for Sac<'_> {
+impl Contender for FlatSac<'_> {
     fn controller(&self, start: RobotState, _episode: u64) -> Box<dyn Controller + '_> {
         let scratch = ActorScratch::default();
         Box::new(SacController {
@@ -94,7 +94,7 @@ impl Contender for Sac<'_> {
 
 #[derive(Debug)]
 struct SacController<'a> {
-    baseline: &'a Sac<'a>,
+    baseline: &'a FlatSac<'a>,
     pose: Pose,
     begun: bool,
     must_back_off: bool,
@@ -111,7 +111,7 @@ impl Controller for SacController<'_> {
     }
 
     fn decide(&mut self) -> Decision {
-        let Sac { world, query, actor, .. } = self.baseline;
+        let FlatSac { world, query, actor, .. } = self.baseline;
         if std::mem::take(&mut self.must_back_off) {
             return Decision::BackOff;
         }

@@ -1,33 +1,75 @@
-//! Drawn problems for all baselines, and pilots that only a test would let drive.
+//! Drawn problems for all baselines, and controllers that only a test would let drive.
 
 use rayon::ThreadPoolBuilder;
+use sharp_drive::{
+    Command, Controller, Decision, EpisodeEnd, Motion, MppiSettings, ProfiledFollower, Readiness, Supervisor,
+    World,
+};
 use sharp_motion::{Budget, RrtSettings};
+use sharp_plan::Query;
 use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
 use sharp_space::{OccupancyGrid, Pose, Seed};
 
 use super::*;
-use crate::drawn::{HALL, RING, SEALED};
-use crate::pace::ProfiledFollower;
+use crate::contender::{ComparisonSettings, Contender, Driven, compare};
 
-const SILENT: Host<'static> = Host { clock_us: &|| 0.0, stop: &|| false };
+/// A hall of 10 by 4 m, 0.4 m a cell.
+const HALL: &str = "
+    #########################
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #########################";
+
+/// A block with a corridor of 2 m all around.
+const RING: &str = "
+    #########################
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.....#############.....#
+    #.....#############.....#
+    #.....#############.....#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #########################";
+
+/// Two rooms without a door.
+const SEALED: &str = "
+    #####################
+    #.........#.........#
+    #.........#.........#
+    #.........#.........#
+    #.........#.........#
+    #.........#.........#
+    #####################";
 
 fn world(drawing: &str, robot: RobotModel) -> World {
-    let plain: String = drawing.chars().map(|c| if c.is_ascii_digit() { '.' } else { c }).collect();
-    World::new(OccupancyGrid::from_ascii(0.4, &plain).expect("a sound drawing"), robot)
+    World::new(OccupancyGrid::from_ascii(0.4, drawing).expect("a sound drawing"), robot)
 }
 
 fn query(start: (f64, f64), goal: (f64, f64)) -> Query {
     Query { start: Pose::new(start.0, start.1, 0.0), goal: Pose::new(goal.0, goal.1, 0.0) }
 }
 
-fn settings(noise: NoiseModel, contact_ends: bool) -> ComparisonSettings {
-    let (episodes, simulator, seed) = (4, SimulatorKind::Kinematic, Seed(1));
-    ComparisonSettings { episodes, simulator, noise, contact_ends, seed }
+fn settings(world: &World, noise: NoiseModel, contact_ends: bool) -> ComparisonSettings {
+    let simulator = world.simulator(SimulatorKind::Kinematic);
+    ComparisonSettings { episodes: 4, simulator, noise, contact_ends, seed: Seed(1) }
 }
 
-fn rrt<'a>(world: &'a World, planner: &'a RoutePlanner<'a>, query: Query) -> Rrt<'a> {
+fn rrt<'a>(planner: &'a RoutePlanner<'a>, world: &'a World, query: Query, contact_ends: bool) -> Rrt<'a> {
     let settings = RrtSettings { budget: Budget { iterations: 3_000 }, ..RrtSettings::default() };
-    Rrt { world, planner, query, settings, seed: Seed(2) }
+    Rrt { world, planner, query, settings, contact_ends, seed: Seed(2) }
 }
 
 /// Lets every method that plans drive `query` and hands what came of it to `check`.
@@ -37,30 +79,25 @@ fn each_drives(
     settings: &ComparisonSettings,
     check: impl Fn(&str, Vec<Driven>),
 ) {
-    let planner = RoutePlanner::new(world);
-    let route = planner.plan(&query).expect("there is a way");
-    let (robot, noise) = (&world.robot, &settings.noise);
-    let track = Track {
+    let planner = &RoutePlanner::new(world, query.goal);
+    let route = planner.plan_from(query.start).expect("there is a way");
+    let (robot, noise) = (&world.robot, settings.noise.clone());
+    let follower = ProfiledFollower::tuned(robot, &noise);
+    let mppi = MppiSettings { samples: 16, ..MppiSettings::new(robot, &noise) };
+    let mpc = Mpc {
         world,
-        planner: &planner,
+        planner,
         query,
         route: route.clone(),
-        settings: ProfiledFollower::tuned(robot, noise),
-        noise: noise.clone(),
-    };
-    let mppi = Mppi {
-        world,
-        planner: &planner,
-        query,
-        route,
-        settings: MppiSettings { samples: 16, ..MppiSettings::new(robot, noise) },
+        settings: mppi,
         noise: noise.clone(),
         seed: Seed(3),
     };
-    let rrt = rrt(world, &planner, query);
-    let methods: [(&str, &dyn Baseline); 3] = [("rrt", &rrt), ("track", &track), ("mppi", &mppi)];
+    let track = Track { world, planner, query, route, follower, noise };
+    let rrt = rrt(planner, world, query, settings.contact_ends);
+    let methods: [(&str, &dyn Contender); 3] = [("rrt", &rrt), ("track", &track), ("mppi", &mpc)];
     for (name, method) in methods {
-        check(name, compare(method, world, &query, settings, &SILENT));
+        check(name, compare(method, world, &query, settings, &Supervisor::silent()));
     }
 }
 
@@ -69,10 +106,10 @@ fn every_method_reaches_the_goal_of_a_ring_without_noise() {
     for robot in [RobotModel::husky(), RobotModel::limo()] {
         let world = world(RING, robot);
         let query = query((1.4, 4.6), (8.6, 1.4));
-        each_drives(&world, query, &settings(NoiseModel::none(), true), |name, driven| {
-            let ends: Vec<_> = driven.iter().map(|one| one.episode.end).collect();
+        each_drives(&world, query, &settings(&world, NoiseModel::none(), true), |name, driven| {
+            let ends: Vec<_> = driven.iter().map(|one| one.end).collect();
             assert_eq!(ends, [EpisodeEnd::Reached; 4], "{name} with the {}", world.robot.name);
-            assert!(driven.iter().all(|one| one.episode.contacts == 0), "{name} touched a wall");
+            assert!(driven.iter().all(|one| one.record.contacts == 0), "{name} touched a wall");
         });
     }
 }
@@ -85,9 +122,8 @@ fn one_thread_and_two_drive_alike() {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
         let told = std::sync::Mutex::new(Vec::new());
         pool.install(|| {
-            each_drives(&world, query, &settings(NoiseModel::harsh(), false), |name, driven| {
-                let traces: Vec<_> =
-                    driven.into_iter().map(|one| (one.episode.end, one.episode.trace)).collect();
+            each_drives(&world, query, &settings(&world, NoiseModel::harsh(), false), |name, driven| {
+                let traces: Vec<_> = driven.into_iter().map(|one| (one.end, one.record.trace)).collect();
                 told.lock().expect("no panic").push((name.to_owned(), traces));
             });
         });
@@ -98,55 +134,66 @@ fn one_thread_and_two_drive_alike() {
     assert_ne!(one[0].1[0], one[0].1[1], "two episodes met the same noise");
 }
 
-/// Drives straight ahead and plans anew with every decision.
+/// Drives straight ahead, plans anew with every decision, and backs off after each contact.
+#[derive(Clone, Copy, Debug)]
 struct Bull {
     nominal_time_s: f64,
     speed_mps: f64,
+    bumped: bool,
 }
 
-impl Baseline for Bull {
-    fn pilot(&self, _episode: u64) -> Box<dyn Pilot + '_> {
-        Box::new(Self { ..*self })
+impl Contender for Bull {
+    fn controller(&self, _start: RobotState, _episode: u64) -> Box<dyn Controller + '_> {
+        Box::new(*self)
     }
 }
 
-impl Pilot for Bull {
-    fn prepare(&mut self, _situation: &Situation) -> Readiness {
+impl Controller for Bull {
+    fn prepare(&mut self) -> Readiness {
         Readiness::Planned { nominal_time_s: self.nominal_time_s }
     }
 
-    fn decide(&mut self, _state: &RobotState) -> Command {
-        Command { reach_m: 0.5, bearing_rad: 0.0, speed_mps: self.speed_mps }
+    fn decide(&mut self) -> Decision {
+        if std::mem::take(&mut self.bumped) {
+            return Decision::BackOff;
+        }
+        Decision::Drive(Command { reach_m: 0.5, bearing_rad: 0.0, speed_mps: self.speed_mps })
+    }
+
+    fn observe(&mut self, motion: &Motion) {
+        self.bumped = motion.contact && motion.command.is_some();
     }
 }
 
-fn bull(speed_mps: f64, nominal_time_s: f64, contact_ends: bool) -> Episode {
+fn bull(speed_mps: f64, nominal_time_s: f64, contact_ends: bool) -> Driven {
     let world = world(HALL, RobotModel::husky());
     // Beside the goal and past it, into the wall.
     let query = query((7.0, 1.0), (9.0, 3.0));
-    let settings = settings(NoiseModel::none(), contact_ends);
-    let mut driven = compare(&Bull { nominal_time_s, speed_mps }, &world, &query, &settings, &SILENT);
-    driven.swap_remove(0).episode
+    let settings = settings(&world, NoiseModel::none(), contact_ends);
+    let bull = Bull { nominal_time_s, speed_mps, bumped: false };
+    compare(&bull, &world, &query, &settings, &Supervisor::silent()).swap_remove(0)
 }
 
 #[test]
 fn a_wall_ends_an_episode_or_is_bumped_into_again() {
     let ended = bull(1.0, 10.0, true);
-    assert_eq!((ended.end, ended.contacts), (EpisodeEnd::Collided, 1), "the first contact is the end");
+    assert_eq!((ended.end, ended.record.contacts), (EpisodeEnd::Collided, 1), "the first contact is the end");
     let bumping = bull(1.0, 10.0, false);
     assert_eq!(bumping.end, EpisodeEnd::TimedOut, "a bull learns nothing");
-    assert!(bumping.contacts > 5, "it backs off and comes again: {} contacts", bumping.contacts);
-    assert!(bumping.path_m > ended.path_m, "the way back is part of the way");
+    let contacts = bumping.record.contacts;
+    assert!(contacts > 5, "it backs off and comes again: {contacts} contacts");
+    assert!(bumping.record.path_m > ended.record.path_m, "the way back is part of the way");
 }
 
 #[test]
 fn episodes_end_at_three_times_the_planned_time_but_not_before_a_minute() {
     for (nominal_time_s, expected_s) in [(10.0, 60.0), (30.0, 90.0)] {
-        let episode = bull(0.0, nominal_time_s, true);
-        assert_eq!(episode.end, EpisodeEnd::TimedOut, "it stands still");
-        assert!((episode.time_s - expected_s).abs() < 0.6, "{} s, expected {expected_s}", episode.time_s);
-        let plans = episode.decisions_us.len() as u32;
-        assert_eq!(episode.events.recoveries, plans - 1, "every plan but the first counts");
+        let driven = bull(0.0, nominal_time_s, true);
+        assert_eq!(driven.end, EpisodeEnd::TimedOut, "it stands still");
+        let time_s = driven.record.time_s;
+        assert!((time_s - expected_s).abs() < 0.6, "{time_s} s, expected {expected_s}");
+        let plans = driven.record.decisions_us.len() as u32;
+        assert_eq!(driven.replans(), plans - 1, "every plan but the first counts");
     }
 }
 
@@ -154,15 +201,16 @@ fn episodes_end_at_three_times_the_planned_time_but_not_before_a_minute() {
 fn no_way_is_said_and_not_driven() {
     let world = world(SEALED, RobotModel::husky());
     let query = query((2.0, 1.4), (6.4, 1.4));
-    let planner = RoutePlanner::new(&world);
-    assert!(planner.plan(&query).is_none(), "a route through a wall");
-    let rrt = rrt(&world, &planner, query);
-    let state = RobotState::at_rest(query.start);
-    let readiness = rrt.pilot(0).prepare(&Situation { state, bumped: false });
-    assert_eq!(readiness, Readiness::NoWay);
+    let planner = RoutePlanner::new(&world, query.goal);
+    assert!(planner.plan_from(query.start).is_none(), "a route through a wall");
     for contact_ends in [true, false] {
-        let driven = compare(&rrt, &world, &query, &settings(NoiseModel::none(), contact_ends), &SILENT);
-        assert!(driven.iter().all(|one| one.episode.end == EpisodeEnd::Lost), "contact ends: {contact_ends}");
+        let rrt = rrt(&planner, &world, query, contact_ends);
+        let mut controller = rrt.controller(RobotState::at_rest(query.start), 0);
+        assert_eq!((controller.prepare(), controller.decide()), (Readiness::Ready, Decision::Lost));
+        let settings = settings(&world, NoiseModel::none(), contact_ends);
+        let driven = compare(&rrt, &world, &query, &settings, &Supervisor::silent());
+        assert!(driven.iter().all(|one| one.end == EpisodeEnd::Lost), "contact ends: {contact_ends}");
+        assert!(driven.iter().all(|one| one.record.path_m == 0.0), "nobody drove");
     }
 }
 
@@ -170,15 +218,20 @@ fn no_way_is_said_and_not_driven() {
 fn whoever_leaves_the_route_gets_a_new_one() {
     let world = world(HALL, RobotModel::husky());
     let query = query((1.0, 2.2), (9.0, 2.2));
-    let planner = RoutePlanner::new(&world);
-    let (settings, noise) = (ProfiledFollower::tuned(&world.robot, &NoiseModel::none()), NoiseModel::none());
-    let route = planner.plan(&query).expect("a hall");
-    let track = Track { world: &world, planner: &planner, query, route, settings, noise };
-    let mut pilot = track.pilot(0);
-    let mut look = |x: f64, y: f64, bumped| {
-        pilot.prepare(&Situation { state: RobotState::at_rest(Pose::new(x, y, 0.0)), bumped })
+    let planner = &RoutePlanner::new(&world, query.goal);
+    let (follower, noise) = (ProfiledFollower::tuned(&world.robot, &NoiseModel::none()), NoiseModel::none());
+    let route = planner.plan_from(query.start).expect("a hall");
+    let track = Track { world: &world, planner, query, route, follower, noise };
+    let mut controller = track.controller(RobotState::at_rest(query.start), 0);
+    assert!(matches!(controller.prepare(), Readiness::Planned { .. }), "the first plan");
+    let mut look = |x: f64, y: f64, contact| {
+        let after = RobotState::at_rest(Pose::new(x, y, 0.0));
+        controller.observe(&Motion { contact, ..Motion::commanded(Command::default(), after) });
+        if contact {
+            assert_eq!(controller.decide(), Decision::BackOff, "first away from the wall");
+        }
+        controller.prepare()
     };
-    assert!(matches!(look(1.0, 2.2, false), Readiness::Planned { .. }), "the first plan");
     for step in 1..8 {
         assert_eq!(look(1.0 + 0.2 * f64::from(step), 2.2, false), Readiness::Ready, "on the route");
     }

@@ -1,5 +1,6 @@
 //! `sharp abstract`: the abstraction of a map, as files, pictures and a route graph.
 
+use sharp_bench::SolveTimes;
 use sharp_drive::World;
 use sharp_options::{OptionKind, OptionSet};
 use sharp_plan::write_atomic;
@@ -7,7 +8,7 @@ use sharp_plan::write_atomic;
 use crate::args::Abstract;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{SolveMonitor, Stopwatch, spinner};
-use crate::report::{AbstractReport, MapReport, SolveTimes};
+use crate::report::{AbstractReport, MapReport};
 use crate::{geojson, input, pictures, pipeline};
 
 pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {

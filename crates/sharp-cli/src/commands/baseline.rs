@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use sharp_bench::{
-    ComparisonSettings, Contender as System, Driven, Mpc, RoutePlanner, Rrt, Sac, SacBudget, Track, compare,
+    ComparisonSettings, Contender as System, DecisionTimes, Driven, FlatSac, Mpc, RoutePlanner, Rrt,
+    SacBudget, Track, compare,
 };
-use sharp_drive::{EpisodeEnd, MppiSettings, ProfiledFollower, SuccessCount, Wall, World};
+use sharp_drive::{EpisodeEnd, MppiSettings, ProfiledFollower, SuccessCount, Supervisor, World};
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::{Conditions, Query};
 use sharp_rl::Progress;
@@ -19,7 +20,7 @@ use crate::curves::CurveFolder;
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{Stopwatch, is_interrupted, spinner};
-use crate::report::{DecisionTimes, MapReport};
+use crate::report::MapReport;
 
 /// Wall time that the paper gives its baselines, seconds.
 const TIME_LIMIT_S: f64 = 2400.0;
@@ -206,7 +207,7 @@ impl Bench<'_> {
             if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let conditions = Conditions::new(&self.world, self.settings.noise.clone());
-        let learnt = Sac::learn(&self.world, self.query, (&conditions, self.seed), budget, &mut observer)
+        let learnt = FlatSac::learn(&self.world, self.query, (&conditions, self.seed), budget, &mut observer)
             .map_err(|error| Failure::from(anyhow::Error::from(error)))?;
         // The limit is for learning: what was learnt is driven in any case.
         let driven = self.drive(&learnt, stopwatch, &is_interrupted);
@@ -222,8 +223,8 @@ impl Bench<'_> {
         stopwatch.enter("drive");
         let begun = Instant::now();
         let clock_us = || begun.elapsed().as_secs_f64() * 1e6;
-        let wall = Wall { clock_us: &clock_us, should_stop: stop };
-        let driven = compare(system, &self.world, &self.query, &self.settings, &wall);
+        let supervisor = Supervisor { clock_us: &clock_us, should_stop: stop };
+        let driven = compare(system, &self.world, &self.query, &self.settings, &supervisor);
         stopwatch.stop();
         Measured { driven, ..Measured::default() }
     }

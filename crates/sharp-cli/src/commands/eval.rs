@@ -5,8 +5,9 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use sharp_bench::{ReportInput, ResultLine, read_baselines, row_text};
+
 use crate::args::{Engine, Eval};
-use crate::evaluation::{self, Evaluation, ResultLine, read_baselines, row_text};
 use crate::jobs::{
     Cluster, Job, Manifest, Merged, Submission, clean, command, count_results, is_queued, merge, run_jobs,
     specs, unfinished,
@@ -43,7 +44,7 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
         }
     } else {
         let of_sharp: Vec<&ResultLine> = lines.iter().copied().filter(|line| line.is_of_sharp()).collect();
-        say!("{}\n{}", evaluation::table(&of_sharp), evaluation::totals(&lines));
+        say!("{}\n{}", sharp_bench::table(&of_sharp), sharp_bench::totals(&lines));
         say!("results in {}, plans and pictures in {}", show(args, "results.jsonl"), show(args, "jobs"));
         say!("report in {}", page.display());
     }
@@ -66,7 +67,8 @@ pub(super) fn write_report(
     let lines = merged.lines().chain(extra).collect();
     let mut commands: Vec<&str> = manifest.jobs.iter().map(|job| job.command.as_str()).collect();
     commands.dedup();
-    evaluation::write(&Evaluation { lines, command: commands.join("\n"), out: &manifest.dir })
+    let input = ReportInput { lines, command: commands.join("\n"), out: &manifest.dir };
+    Ok(sharp_bench::write_report(&input)?)
 }
 
 fn show(args: &Eval, name: &str) -> String {

@@ -3,9 +3,10 @@
 use std::ops::Range;
 use std::path::Path;
 
+use sharp_bench::{ResultLine, row_text};
+
 use crate::args::{Jobs, Selection, Submit};
 use crate::commands::eval::write_report;
-use crate::evaluation::{ResultLine, row_text};
 use crate::jobs::{Cluster, Ended, Manifest, Submission, clean, command, merge, run_job, specs, unfinished};
 use crate::outcome::{Exit, Failure, say, to_json};
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::ProgressBar;
+use sharp_bench::{Reuse, SolveTimes};
 use sharp_drive::World;
 use sharp_maps::MapFile;
 use sharp_plan::{AbstractionFile, Answer, Method, Plan, Sharp, write_atomic};
@@ -12,7 +13,7 @@ use sharp_space::Seed;
 use crate::args::{Guide, Learning, Solve, Switch};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{SolveMonitor, Stopwatch, is_interrupted, spinner};
-use crate::report::{MapReport, Reuse, SolveReport, SolveTimes};
+use crate::report::{MapReport, SolveReport};
 use crate::{input, pictures, pipeline};
 
 /// What solving gave: the report, and the plan if there is one.

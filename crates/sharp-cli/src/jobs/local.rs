@@ -11,8 +11,8 @@ use std::thread;
 
 use super::manifest::Job;
 use super::work::{Ended, run_job};
-use crate::evaluation::ResultLine;
 use crate::outcome::Failure;
+use sharp_bench::ResultLine;
 
 /// Does `jobs` below `dir`, at most `workers` at once, and tells `watch` of every result as it comes.
 /// Returns how each job ended, in the order of `jobs`; one that fails or panics stops no other.

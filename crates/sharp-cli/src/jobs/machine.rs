@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::evaluation::Machine;
+use sharp_bench::Machine;
 
 /// This machine, as far as the system tells.
 pub(super) fn machine() -> Machine {

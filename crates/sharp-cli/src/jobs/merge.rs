@@ -2,12 +2,12 @@
 
 use std::fs;
 
+use sharp_bench::ResultLine;
 use sharp_plan::write_atomic;
 
 use super::manifest::{Job, Manifest};
 use super::step::{Done, UNFINISHED};
 use super::work::steps;
-use crate::evaluation::ResultLine;
 use crate::outcome::Failure;
 
 /// All results that are there, and the jobs that are not whole.

@@ -4,10 +4,10 @@ use std::fs;
 use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
+use sharp_bench::{Variant, default_regions};
 use sharp_plan::{hash, map_hash};
 
 use crate::args::{Contender, Kind, Learning, MapArgs, Switch, Unknown};
-use crate::evaluation::{default_regions, variant};
 use crate::input;
 use crate::outcome::{Failure, to_json};
 
@@ -111,7 +111,8 @@ impl Spec {
         let on = (Switch::On, Switch::On);
         let (recovery, cost_update) =
             self.sharp.as_ref().map_or(on, |sharp| (sharp.recovery, sharp.cost_update));
-        variant(recovery, cost_update)
+        let is_on = |switch| switch == Switch::On;
+        Variant { has_recovery: is_on(recovery), has_cost_update: is_on(cost_update) }.name()
     }
 
     /// Verifies that this program reads what the job was planned for.

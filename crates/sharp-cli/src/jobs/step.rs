@@ -10,10 +10,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use sharp_bench::{ResultLine, problem_folder};
 use sharp_plan::{hash, write_atomic};
 
 use super::manifest::Job;
-use crate::evaluation::{ResultLine, problem_folder};
 use crate::outcome::{Failure, to_json};
 
 const SCHEMA: &str = "sharp.step/1";

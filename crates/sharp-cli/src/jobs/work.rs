@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
+use sharp_bench::{DecisionTimes, ResultLine, Reuse, SolveTimes};
 use sharp_drive::{FAILURE_COST_S, SuccessCount};
 use sharp_plan::{Plan, RunSettings, run as run_plan, write_atomic};
 use sharp_space::Seed;
@@ -19,11 +20,10 @@ use crate::args::{
 };
 use crate::commands::baseline::{BaselineReport, measure};
 use crate::commands::solve::{Solved, solve_problem};
-use crate::evaluation::ResultLine;
 use crate::outcome::{Failure, to_json};
 use crate::pictures;
 use crate::progress::is_interrupted;
-use crate::report::{DecisionTimes, Reuse, RunReport, SolveReport, SolveTimes};
+use crate::report::{RunReport, SolveReport};
 
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -29,7 +29,7 @@ const RAMP_STEPS: usize = 30;
 
 /// What is drawn before a name.
 #[derive(Clone, Debug, PartialEq)]
-enum Sample {
+enum LegendSample {
     /// A bar as long as so many pixels.
     Scale(f64),
     /// The colours of a field from 0 to its largest value.
@@ -57,15 +57,15 @@ enum Sample {
 /// An item of the legend.
 #[derive(Clone, Debug, PartialEq)]
 struct CaptionItem {
-    sample: Sample,
+    sample: LegendSample,
     name: String,
 }
 
 impl CaptionItem {
     fn sample_width(&self) -> f64 {
         match self.sample {
-            Sample::Scale(length) => length,
-            Sample::Ramp => 90.0,
+            LegendSample::Scale(length) => length,
+            LegendSample::Ramp => 90.0,
             _ => SAMPLE[0],
         }
     }
@@ -103,38 +103,42 @@ impl Scene<'_> {
 
     fn caption_items(&self) -> Vec<CaptionItem> {
         let mut items = vec![self.scale()];
-        let mut add = |is_there: bool, sample: Sample, name: &str| {
+        let mut add = |is_there: bool, sample: LegendSample, name: &str| {
             if is_there {
                 items.push(CaptionItem { sample, name: name.to_owned() });
             }
         };
         if let Some((field, name)) = self.heat {
             let top = HeatBlocks::average(self.grid, field).top();
-            add(true, Sample::Ramp, &format!("{name}, 0 to {top:.2}"));
+            add(true, LegendSample::Ramp, &format!("{name}, 0 to {top:.2}"));
         }
-        add(self.problem.is_some(), Sample::Circle { fill: START, radius: 7.0 }, "start");
-        add(self.problem.is_some(), Sample::Star, "goal");
-        add(!self.guides.is_empty(), Sample::Line { color: GUIDE, is_dashed: true }, "guide path");
+        add(self.problem.is_some(), LegendSample::Circle { fill: START, radius: 7.0 }, "start");
+        add(self.problem.is_some(), LegendSample::Star, "goal");
+        add(!self.guides.is_empty(), LegendSample::Line { color: GUIDE, is_dashed: true }, "guide path");
         let count = |failed| self.trajectories.iter().filter(|it| it.failed == failed).count();
         let (reached, failed) = (count(false), count(true));
-        let line = |color| Sample::Line { color, is_dashed: false };
+        let line = |color| LegendSample::Line { color, is_dashed: false };
         add(reached > 0, line(REACHED), &format!("reached the goal ({reached})"));
-        add(failed > 0, Sample::Cross, &format!("failed ({failed})"));
+        add(failed > 0, LegendSample::Cross, &format!("failed ({failed})"));
         let has_footprints = self.footprint.is_some() && !self.trajectories.is_empty();
-        add(has_footprints, Sample::Footprint, &format!("robot, every {} m", plain(FOOTPRINT_SPACING_M)));
+        add(
+            has_footprints,
+            LegendSample::Footprint,
+            &format!("robot, every {} m", plain(FOOTPRINT_SPACING_M)),
+        );
         let states = if self.labels.is_empty() { "abstract states" } else { "abstract states, numbered" };
-        add(self.states.is_some(), Sample::States, states);
+        add(self.states.is_some(), LegendSample::States, states);
         let is_free = |index: usize| self.grid.cells()[index] == Occupancy::Free;
         let is_left_out = |(index, state): (usize, &Option<u32>)| state.is_none() && is_free(index);
         let has_left_out = self.states.as_ref().is_some_and(|all| all.iter().enumerate().any(is_left_out));
-        add(has_left_out, Sample::Area(FREE), "free, in no state");
+        add(has_left_out, LegendSample::Area(FREE), "free, in no state");
         let (rim, is_filled) = if self.heat.is_some() { (REGION, false) } else { (INK, true) };
-        add(!self.regions.is_empty(), Sample::Outline { rim, is_filled }, "critical regions");
-        let circle = Sample::Circle { fill: Color::WHITE, radius: 8.0 };
+        add(!self.regions.is_empty(), LegendSample::Outline { rim, is_filled }, "critical regions");
+        let circle = LegendSample::Circle { fill: Color::WHITE, radius: 8.0 };
         add(!self.endpoints.is_empty(), circle, "endpoints of options");
-        add(!self.options.is_empty(), Sample::Arrow, "options");
+        add(!self.options.is_empty(), LegendSample::Arrow, "options");
         let has_unknown = self.grid.cells().contains(&Occupancy::Unknown);
-        add(has_unknown, Sample::Area(UNKNOWN), "unknown");
+        add(has_unknown, LegendSample::Area(UNKNOWN), "unknown");
         items
     }
 
@@ -142,7 +146,10 @@ impl Scene<'_> {
     fn scale(&self) -> CaptionItem {
         let px_per_m = self.view.px_per_m();
         let length_m = round_step(SCALE_SHARE * self.view.size_px()[0] / px_per_m);
-        CaptionItem { sample: Sample::Scale(length_m * px_per_m), name: format!("{} m", plain(length_m)) }
+        CaptionItem {
+            sample: LegendSample::Scale(length_m * px_per_m),
+            name: format!("{} m", plain(length_m)),
+        }
     }
 }
 
@@ -157,7 +164,7 @@ impl Caption {
     }
 }
 
-impl Sample {
+impl LegendSample {
     /// Draws the sample from `left` on, centred at the height `y`.
     fn draw(&self, svg: &mut Svg, left: f64, y: f64) {
         let (right, center) = (left + SAMPLE[0], left + SAMPLE[0] / 2.0);

@@ -12,7 +12,7 @@ use super::{LearnFailure, LearningTask, LearntPolicy};
 use crate::files::FileError;
 use crate::method::LearningOrder;
 use crate::policies::Policies;
-use crate::problem::Problem;
+use crate::problem::PlanningProblem;
 use crate::query::{OptionMonitor, Phase};
 use crate::search::Search;
 
@@ -24,7 +24,7 @@ const STATE_POOL: usize = 256;
 /// Learns the policies of `plan` that neither the library nor an earlier attempt has (lines 11, 14 to 16, 19).
 /// Returns false if it was stopped.
 pub(crate) fn learn_missing(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     plan: &[Arc<GuidedOption>],
     search: &Search<'_>,
     policies: &mut Policies<'_>,
@@ -46,7 +46,7 @@ pub(crate) fn learn_missing(
 
 /// One option after the other, each from where the one before it arrives and with the next in view.
 fn learn_chained(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     plan: &[Arc<GuidedOption>],
     search: &Search<'_>,
     policies: &mut Policies<'_>,
@@ -72,7 +72,7 @@ fn learn_chained(
 
 /// Each option on its own and all at once: the paper's way.
 fn learn_independent(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     missing: &[&Arc<GuidedOption>],
     search: &Search<'_>,
     policies: &mut Policies<'_>,
@@ -93,7 +93,7 @@ fn learn_independent(
 
 /// Keeps what was learnt of `option`; false if learning was stopped.
 fn take(
-    problem: &Problem<'_>,
+    problem: &PlanningProblem<'_>,
     option: &Arc<GuidedOption>,
     result: Result<LearntPolicy, LearnFailure>,
     search: &Search<'_>,
@@ -111,13 +111,13 @@ fn take(
     Ok(true)
 }
 
-fn option_seed(problem: &Problem<'_>, option: &GuidedOption) -> Seed {
+fn option_seed(problem: &PlanningProblem<'_>, option: &GuidedOption) -> Seed {
     problem.seed.child(&format!("leg {}", option.id), 0)
 }
 
 /// The task of learning `option` from `states`, with nothing known of what comes after it.
 pub(crate) fn task<'a>(
-    problem: &Problem<'a>,
+    problem: &PlanningProblem<'a>,
     option: &'a Arc<GuidedOption>,
     states: InitialStates,
     seed: Seed,
@@ -137,6 +137,10 @@ pub(crate) fn task<'a>(
 }
 
 /// Where `option` begins: at the initial configuration, or spread over its initiation set.
-pub(crate) fn initial_states(problem: &Problem<'_>, option: &GuidedOption, seed: Seed) -> InitialStates {
+pub(crate) fn initial_states(
+    problem: &PlanningProblem<'_>,
+    option: &GuidedOption,
+    seed: Seed,
+) -> InitialStates {
     InitialStates::of_option(problem.world, option, problem.query.start, STATE_POOL, seed)
 }

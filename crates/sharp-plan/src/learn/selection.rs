@@ -189,3 +189,42 @@ pub(crate) fn successive_halving(
     }
     candidates
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_drive::InitialStates;
+    use sharp_options::OptionKind;
+    use sharp_sim::RobotState;
+    use sharp_space::Seed;
+
+    use super::*;
+    use crate::conditions::Conditions;
+    use crate::method::Method;
+    use crate::test_worlds::{HALL, along, options, world};
+
+    #[test]
+    fn an_easy_option_needs_no_network() {
+        let (world, abstraction) = world(HALL, OptionKind::Centroid);
+        let options = options(&world, &abstraction, along());
+        let start = RobotState::at_rest(options[1].guide.start());
+        let (conditions, method) = (Conditions::new(&world, NoiseModel::nominal()), Method::fast());
+        let task = LearningTask {
+            world: &world,
+            conditions: &conditions,
+            option: &options[1],
+            next: None,
+            tail: &[],
+            states: Arc::new(InitialStates::exactly(start)),
+            wanted_success: method.option_success,
+            failure_cost_s: method.failure_cost_s,
+            estimate_episodes: method.estimate_episodes,
+            seed: Seed(1),
+        };
+        let learnt = method.learner.learn(&task, &|| false).expect("a sound task");
+        assert!(matches!(learnt.policy, OptionPolicy::Follower(_)), "a network in an open hall");
+        assert_eq!(learnt.estimate.count.episodes, 1000, "estimated on fresh episodes");
+        assert!(learnt.estimate.count.rate() >= 0.99, "only {:?}", learnt.estimate);
+        let stopped = method.learner.learn(&task, &|| true);
+        assert!(matches!(stopped, Err(LearnFailure::Stopped)), "a stop is heard");
+    }
+}

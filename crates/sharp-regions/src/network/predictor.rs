@@ -85,8 +85,8 @@ impl RegionPredictor {
     }
 
     /// The network's answer for every pixel.
-    fn answer(&self, image: &Image) -> Answer {
-        let mut answer = Answer::new(image.frame);
+    fn answer(&self, image: &Image) -> NetworkOutput {
+        let mut answer = NetworkOutput::new(image.frame);
         for &row in &tile_starts(image.frame.height) {
             for &col in &tile_starts(image.frame.width) {
                 self.answer_tile(image, Cell::new(col, row), &mut answer);
@@ -96,7 +96,7 @@ impl RegionPredictor {
         answer
     }
 
-    fn answer_tile(&self, image: &Image, corner: Cell, answer: &mut Answer) {
+    fn answer_tile(&self, image: &Image, corner: Cell, answer: &mut NetworkOutput) {
         let frame = &image.frame;
         let stride = self.network.config().stride();
         let size = |start: usize, side: usize| (side - start).min(TILE);
@@ -129,7 +129,7 @@ impl RegionPredictor {
 }
 
 /// The network's answers, summed over tiles.
-struct Answer {
+struct NetworkOutput {
     frame: GridFrame,
     criticality: Vec<f32>,
     headings: Vec<u8>,
@@ -137,7 +137,7 @@ struct Answer {
     heading_weights: Vec<f32>,
 }
 
-impl Answer {
+impl NetworkOutput {
     fn new(frame: GridFrame) -> Self {
         let zeros = vec![0.0; frame.len()];
         Self {

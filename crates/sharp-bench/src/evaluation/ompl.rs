@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 use super::cases::{Setting, method, ready_s};
 use super::figure::Style;
-use super::lines::ResultLine;
+use crate::result::ResultLine;
 
 /// Time limit of a run that `sharp eval` sets unless told otherwise, seconds.
 const TIME_LIMIT_S: f64 = 2400.0;
@@ -157,7 +157,7 @@ fn token(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::lines::Machine;
+    use crate::result::Machine;
 
     /// Reads `count NAME` and returns the count.
     fn counted(line: Option<&str>, name: &str) -> usize {

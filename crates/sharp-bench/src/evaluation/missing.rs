@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::ablations::ABLATIONS;
 use super::cases::{Results, Setting, method};
-use super::lines::ResultLine;
 use super::noise;
+use crate::result::ResultLine;
 
 /// Levels of noise that a sweep needs, times nominal, and their names.
 const SWEEP: [(f64, &str); 4] = [(0.0, "none"), (1.0, "nominal"), (2.0, "'nominal*2'"), (4.0, "'nominal*4'")];

@@ -7,8 +7,8 @@ use sharp_draw::numbers::percent;
 use sharp_draw::{Axis, Panel};
 
 use super::figure::{Figure, LABEL, Style, Table, marker, method_legend};
-use super::lines::ResultLine;
-use crate::report::Reuse;
+use crate::result::ResultLine;
+use crate::times::Reuse;
 
 const BAR: f64 = 15.0;
 const GAP: f64 = 5.0;

@@ -8,7 +8,7 @@ use sharp_drive::SuccessCount;
 
 use super::cases::Mean;
 use super::figure::{Figure, Style, Table, marker, method_legend};
-use super::lines::ResultLine;
+use crate::result::ResultLine;
 
 /// The plotted square: left, right, top, bottom.
 const AREA: [f64; 4] = [60.0, 340.0, 30.0, 310.0];

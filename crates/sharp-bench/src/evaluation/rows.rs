@@ -3,9 +3,9 @@
 use sharp_draw::numbers::{percent, plain, seconds};
 use sharp_draw::{Axis, Chart, Panel};
 
-use super::cases::{Case, cases};
+use super::cases::{MethodCase, cases};
 use super::figure::{Figure, LABEL, Style, Table, marker, method_legend, noted};
-use super::lines::ResultLine;
+use crate::result::ResultLine;
 
 const ROW: f64 = 13.0;
 const GAP: f64 = 7.0;
@@ -15,19 +15,19 @@ const SHORTEST_S: f64 = 0.01;
 /// What a figure shows of a case.
 struct Shown {
     /// Both ends of the interval and what lies between; `None` if there is nothing to show.
-    values: fn(&Case<'_>) -> Option<[f64; 3]>,
+    values: fn(&MethodCase<'_>) -> Option<[f64; 3]>,
     /// The number at the right.
-    number: fn(&Case<'_>) -> String,
+    number: fn(&MethodCase<'_>) -> String,
     /// The axis of a panel with these cases.
-    axis: fn(&[Case<'_>]) -> Axis,
+    axis: fn(&[MethodCase<'_>]) -> Axis,
     /// How the axis writes its values.
     tick: fn(f64) -> String,
     /// Columns of the table behind those that name the case.
-    columns: &'static [Column],
+    columns: &'static [CaseColumn],
 }
 
 /// A column: its name, and what a case has in it.
-type Column = (&'static str, fn(&Case<'_>) -> String);
+type CaseColumn = (&'static str, fn(&MethodCase<'_>) -> String);
 
 /// Time until there is something to drive with: the paper's figure of times.
 pub(super) fn time(name: &'static str, title: &'static str, lines: &[&ResultLine]) -> Figure {
@@ -95,7 +95,7 @@ fn figure(
     shown: &Shown,
 ) -> Figure {
     let cases = cases(lines);
-    let same = |a: &Case<'_>, b: &Case<'_>| (a.env, a.robot) == (b.env, b.robot);
+    let same = |a: &MethodCase<'_>, b: &MethodCase<'_>| (a.env, a.robot) == (b.env, b.robot);
     Figure {
         name,
         title,
@@ -107,14 +107,14 @@ fn figure(
 }
 
 /// The methods, and what hollow markers say where there are any.
-fn legend_of(cases: &[Case<'_>]) -> Chart {
+fn legend_of(cases: &[MethodCase<'_>]) -> Chart {
     let methods = method_legend(cases.iter().map(|case| case.method));
     let has_hollow = cases.iter().any(|case| case.tally.successes == 0);
     if has_hollow { noted(&methods, "hollow: never reached the goal") } else { methods }
 }
 
-fn panel(cases: &[Case<'_>], shown: &Shown) -> Panel {
-    let problems: Vec<&[Case<'_>]> = cases.chunk_by(|a, b| a.problem == b.problem).collect();
+fn panel(cases: &[MethodCase<'_>], shown: &Shown) -> Panel {
+    let problems: Vec<&[MethodCase<'_>]> = cases.chunk_by(|a, b| a.problem == b.problem).collect();
     let bottom = Panel::TOP + GAP * problems.len() as f64 + ROW * cases.len() as f64;
     let title = format!("environment {}, {}", cases[0].env, cases[0].robot);
     let mut panel = Panel::new(title, bottom + Axis::FOOT);
@@ -133,7 +133,7 @@ fn panel(cases: &[Case<'_>], shown: &Shown) -> Panel {
     panel
 }
 
-fn mark(panel: &mut Panel, case: &Case<'_>, shown: &Shown, axis: &Axis, y: f64) {
+fn mark(panel: &mut Panel, case: &MethodCase<'_>, shown: &Shown, axis: &Axis, y: f64) {
     let style = Style::of(case.method);
     if let Some([low, value, high]) = (shown.values)(case) {
         panel.chart.line([axis.at(low), y], [axis.at(high), y], style.color, 2.0);
@@ -142,10 +142,10 @@ fn mark(panel: &mut Panel, case: &Case<'_>, shown: &Shown, axis: &Axis, y: f64) 
     panel.chart.text([Panel::NUMBERS, y + 4.0], LABEL.end(), (shown.number)(case));
 }
 
-fn table(cases: &[Case<'_>], more: &[Column]) -> Table {
+fn table(cases: &[MethodCase<'_>], more: &[CaseColumn]) -> Table {
     let mut columns = vec!["env", "robot", "problem", "method", "trials"];
     columns.extend(more.iter().map(|(name, _)| name));
-    let row = |case: &Case<'_>| {
+    let row = |case: &MethodCase<'_>| {
         let mut row = vec![
             case.env.to_owned(),
             case.robot.to_owned(),
@@ -170,7 +170,7 @@ pub(super) fn label(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::SolveTimes;
+    use crate::times::SolveTimes;
 
     fn baseline(successes: u32) -> ResultLine {
         let line = ResultLine::example("a", "limo", "none", 1);

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use super::lines::ResultLine;
-use crate::outcome::Failure;
+use super::ReportError;
+use crate::result::ResultLine;
 
 /// Pictures of one sort.
 #[derive(Debug)]
@@ -14,12 +14,12 @@ pub(super) struct Gallery {
     pub(super) title: &'static str,
     /// How to read it.
     pub(super) text: &'static str,
-    pub(super) pictures: Vec<Picture>,
+    pub(super) pictures: Vec<GalleryPicture>,
 }
 
 /// A picture that travels inside the page.
 #[derive(Debug)]
-pub(super) struct Picture {
+pub(super) struct GalleryPicture {
     /// Its place in the page, and the name of its file.
     pub(super) name: String,
     pub(super) caption: String,
@@ -34,7 +34,7 @@ pub(super) struct Picture {
 ///
 /// # Errors
 /// Returns an error if a picture is there but cannot be read.
-pub(super) fn collect(lines: &[&ResultLine], out: &Path) -> Result<[Gallery; 2], Failure> {
+pub(super) fn collect(lines: &[&ResultLine], out: &Path) -> Result<[Gallery; 2], ReportError> {
     let mut shown: Vec<&ResultLine> = Vec::new();
     for line in lines.iter().filter(|line| line.is_solved()) {
         if !shown.iter().any(|other| (&other.env, &other.options) == (&line.env, &line.options)) {
@@ -45,14 +45,14 @@ pub(super) fn collect(lines: &[&ResultLine], out: &Path) -> Result<[Gallery; 2],
     Ok([abstractions(&shown, out)?, executions(&shown, out)?])
 }
 
-fn abstractions(lines: &[&ResultLine], out: &Path) -> Result<Gallery, Failure> {
+fn abstractions(lines: &[&ResultLine], out: &Path) -> Result<Gallery, ReportError> {
     let mut pictures = Vec::new();
     for line in lines {
         let ResultLine { env, options, robot, .. } = line;
         let folder = line.plan_folder(out);
         let files = (read(&folder.join("abstraction.svg"))?, read(&folder.join("abstraction.png"))?);
         if let (Some(svg), Some(png)) = files {
-            pictures.push(Picture {
+            pictures.push(GalleryPicture {
                 name: format!("abstraction-{env}-{options}"),
                 caption: format!("{env}, {options} options for {robot}"),
                 // Smaller than the PNG, and sharp at every size.
@@ -71,11 +71,11 @@ fn abstractions(lines: &[&ResultLine], out: &Path) -> Result<Gallery, Failure> {
     })
 }
 
-fn executions(lines: &[&ResultLine], out: &Path) -> Result<Gallery, Failure> {
+fn executions(lines: &[&ResultLine], out: &Path) -> Result<Gallery, ReportError> {
     let mut pictures = Vec::new();
     for line in lines {
         let ResultLine { env, options, robot, problem, successes, episodes, .. } = line;
-        pictures.extend(read(&line.plan_folder(out).join("run.png"))?.map(|png| Picture {
+        pictures.extend(read(&line.plan_folder(out).join("run.png"))?.map(|png| GalleryPicture {
             name: format!("executions-{env}-{options}"),
             caption: format!(
                 "{env}, {options}: {robot}, problem {problem}, {successes} of {episodes} executions arrived"
@@ -94,11 +94,11 @@ fn executions(lines: &[&ResultLine], out: &Path) -> Result<Gallery, Failure> {
 }
 
 /// The bytes of `path`; `None` if there is no such file.
-fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
+fn read(path: &Path) -> Result<Option<Vec<u8>>, ReportError> {
     match std::fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(Failure::new("FILE_INVALID", format!("{}: {error}", path.display()))),
+        Err(source) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(ReportError::Picture { path: path.to_owned(), source }),
     }
 }
 

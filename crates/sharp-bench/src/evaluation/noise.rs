@@ -6,10 +6,10 @@ use sharp_draw::numbers::{percent, plain};
 use sharp_draw::{Axis, Panel};
 use sharp_drive::SuccessCount;
 
-use super::cases::{Problem, Results, Setting, method, problem, tally};
+use super::cases::{ProblemKey, Results, Setting, method, problem, tally};
 use super::figure::{Figure, Style, Table, marker, method_legend};
-use super::lines::ResultLine;
 use super::rows::label;
+use crate::result::ResultLine;
 
 /// The plotted area: left, right, top, bottom.
 const AREA: [f64; 4] = [60.0, 340.0, Panel::TOP + 6.0, 236.0];
@@ -90,7 +90,7 @@ fn of_method<'a>(robot: &'a str, method: &'a str, lines: &[(f64, &'a ResultLine)
     factors.sort_by(f64::total_cmp);
     factors.dedup();
     let at = |wanted: f64| lines.iter().filter(move |&&(factor, _)| factor == wanted).map(|&(_, line)| line);
-    let problems_at = |factor| -> BTreeSet<Problem<'a>> { at(factor).map(problem).collect() };
+    let problems_at = |factor| -> BTreeSet<ProblemKey<'a>> { at(factor).map(problem).collect() };
     let problems = factors.iter().map(|&factor| problems_at(factor)).reduce(|a, b| &a & &b)?;
     let tally_at = |factor| {
         let shared: Vec<_> = at(factor).filter(|line| problems.contains(&problem(line))).collect();

@@ -8,7 +8,6 @@ mod calibration;
 mod cases;
 mod figure;
 mod gallery;
-mod lines;
 mod methods;
 mod missing;
 mod noise;
@@ -21,28 +20,45 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
-use sharp_draw::svg_to_png;
-use sharp_plan::write_atomic;
+use sharp_draw::{PngError, svg_to_png};
+use sharp_plan::{FileError, write_atomic};
 
 use self::cases::Results;
 use self::figure::Figure;
-use crate::outcome::Failure;
+use crate::result::ResultLine;
 
-pub(crate) use lines::{
-    Machine, ResultLine, default_regions, problem_folder, read_baselines, row_text, variant,
-};
-pub(crate) use methods::totals;
-pub(crate) use tables::table;
+pub use methods::totals;
+pub use tables::table;
 
 /// What a report is made from.
 #[derive(Debug)]
-pub(crate) struct Evaluation<'a> {
+pub struct ReportInput<'a> {
     /// All results there are, of SHARP in any setting and of the baselines.
-    pub(crate) lines: Vec<&'a ResultLine>,
+    pub lines: Vec<&'a ResultLine>,
     /// The command that makes the same report again.
-    pub(crate) command: String,
+    pub command: String,
     /// Where the plans of `lines` lie.
-    pub(crate) out: &'a Path,
+    pub out: &'a Path,
+}
+
+/// Why a report cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// A file of the report cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A picture of a plan is there but cannot be read.
+    #[error("{}: {source}", path.display())]
+    Picture {
+        /// The picture.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Drawing(#[from] PngError),
 }
 
 /// Writes `tables.md`, `methods.md`, `ompl.log`, every figure as SVG and PNG, every picture as PNG, and
@@ -50,25 +66,25 @@ pub(crate) struct Evaluation<'a> {
 ///
 /// # Errors
 /// Returns an error if a picture of a plan cannot be read or a file cannot be written.
-pub(crate) fn write(evaluation: &Evaluation<'_>) -> Result<PathBuf, Failure> {
-    let folder = evaluation.out.join("report");
-    let results = Results::new(&evaluation.lines);
+pub fn write_report(input: &ReportInput<'_>) -> Result<PathBuf, ReportError> {
+    let folder = input.out.join("report");
+    let results = Results::new(&input.lines);
     let figures = figures(&results);
     for figure in &figures {
         let (svg, side_px) = figure.to_svg();
         write_atomic(&folder.join(format!("{}.svg", figure.name)), svg.as_bytes())?;
         write_atomic(&folder.join(format!("{}.png", figure.name)), &svg_to_png(&svg, side_px)?)?;
     }
-    let galleries = gallery::collect(&results.sharp(results.main), evaluation.out)?;
+    let galleries = gallery::collect(&results.sharp(results.main), input.out)?;
     for picture in galleries.iter().flat_map(|gallery| &gallery.pictures) {
         write_atomic(&folder.join(format!("{}.png", picture.name)), &picture.png)?;
     }
     write_atomic(&folder.join("methods.md"), methods::tables(&results.lines).as_bytes())?;
     write_atomic(&folder.join("ompl.log"), ompl::log(&results.lines).as_bytes())?;
-    let missing = missing::missing(&results, evaluation.out);
+    let missing = missing::missing(&results, input.out);
     write_atomic(&folder.join("tables.md"), tables::document(&results, &figures).as_bytes())?;
     let page = folder.join("index.html");
-    let parts = page::Parts { results, command: &evaluation.command, figures, galleries, missing };
+    let parts = page::Parts { results, command: &input.command, figures, galleries, missing };
     write_atomic(&page, page::html(&parts).as_bytes())?;
     Ok(page)
 }
@@ -101,6 +117,7 @@ fn figures(results: &Results<'_>) -> Vec<Figure> {
 }
 
 #[cfg(test)]
+#[path = "tests/browser.rs"]
 mod browser;
 
 #[cfg(test)]
@@ -109,12 +126,12 @@ mod tests {
 
     /// Writes the report of `lines` and returns its page.
     pub(super) fn evaluate(lines: &[ResultLine], out: &Path) -> String {
-        let evaluation = Evaluation {
+        let evaluation = ReportInput {
             lines: lines.iter().collect(),
             command: "sharp eval \"quick\" --out <here>".into(),
             out,
         };
-        let page = write(&evaluation).expect("a report");
+        let page = write_report(&evaluation).expect("a report");
         std::fs::read_to_string(page).expect("a page")
     }
 
@@ -145,7 +162,7 @@ mod tests {
                 status: "no_plan".into(),
                 successes: 0,
                 predicted_success: 0.0,
-                time_s: crate::report::SolveTimes::default(),
+                time_s: crate::times::SolveTimes::default(),
                 ..ResultLine::example("a", "husky", "interface", 3)
             },
         ]

@@ -1,117 +1,177 @@
-//! The lines that a report reads: `sharp.result/1`, of SHARP and of the systems to compare with.
+//! Results: one line of JSON (`sharp.result/1`) a problem, of SHARP and of the systems to compare with.
+//!
+//! Keys are a contract: once written, a key keeps its meaning, and lines of before stay readable.
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sharp_drive::SuccessCount;
 
-use crate::args::Switch;
-use crate::outcome::Failure;
-use crate::report::{DecisionTimes, Reuse, SolveTimes};
+use crate::times::{DecisionTimes, Reuse, SolveTimes};
 
 /// `sharp.result/1`: one line of `results.jsonl`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct ResultLine {
-    pub(crate) schema: String,
-    pub(crate) version: String,
+pub struct ResultLine {
+    /// The name and version of the format, `sharp.result/1`.
+    pub schema: String,
+    /// The version of the program that measured.
+    pub version: String,
     /// sharp, rrt, rrt-contact, track, mppi or sac.
-    pub(crate) method: String,
+    pub method: String,
     /// fast, paper or prior; none for the baselines.
-    pub(crate) learning: String,
-    pub(crate) env: String,
-    pub(crate) problem: usize,
-    pub(crate) robot: String,
+    pub learning: String,
+    /// The environment: the name of a map.
+    pub env: String,
+    /// The number of the problem in its environment, from 1.
+    pub problem: usize,
+    /// The name of the robot.
+    pub robot: String,
     /// The kind of option; none for the baselines.
-    pub(crate) options: String,
+    pub options: String,
+    /// Where critical regions came from.
     #[serde(default = "default_regions")]
-    pub(crate) regions: String,
+    pub regions: String,
     /// Options synthesised in the environment.
     #[serde(default)]
-    pub(crate) options_available: usize,
-    pub(crate) noise: String,
+    pub options_available: usize,
+    /// The name of the noise.
+    pub noise: String,
     /// What was switched off: `default`, `no_recovery`, `no_cost_update` or both with a plus between.
     #[serde(default = "default_variant")]
-    pub(crate) variant: String,
+    pub variant: String,
+    /// The simulator that executions ran in.
     #[serde(default = "default_simulator")]
-    pub(crate) simulator: String,
-    pub(crate) trial: u32,
-    pub(crate) seed: u64,
+    pub simulator: String,
+    /// Which repetition with other random numbers, from 0.
+    pub trial: u32,
+    /// Root of all randomness.
+    pub seed: u64,
     /// `solved`, `no_plan` or `timeout`; `driven` for the baselines.
-    pub(crate) status: String,
-    pub(crate) episodes: u32,
-    pub(crate) successes: u32,
-    pub(crate) collisions: u32,
-    pub(crate) timeouts: u32,
-    pub(crate) recoveries: u32,
-    pub(crate) mean_sim_time_s: f64,
-    pub(crate) predicted_success: f64,
+    pub status: String,
+    /// Executions.
+    pub episodes: u32,
+    /// Executions that reached the goal.
+    pub successes: u32,
+    /// Contacts of all executions.
+    pub collisions: u32,
+    /// Executions that ran out of time or lost their way.
+    pub timeouts: u32,
+    /// New plans on the way, of all executions.
+    pub recoveries: u32,
+    /// Mean simulated time of the executions that reached the goal, seconds; 0 if none did.
+    pub mean_sim_time_s: f64,
+    /// The success that solving predicted, 0 to 1; 0 for the baselines.
+    pub predicted_success: f64,
     /// More executions of a plan, to hold against what it predicted: as many as its prediction took.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) calibration: Option<SuccessCount>,
-    pub(crate) reuse: Reuse,
-    pub(crate) env_steps: u64,
-    pub(crate) gradient_steps: u64,
+    pub calibration: Option<SuccessCount>,
+    /// How many of the plan's options had been learnt before.
+    pub reuse: Reuse,
+    /// Steps of the environment that learning took.
+    pub env_steps: u64,
+    /// Gradient steps that learning took.
+    pub gradient_steps: u64,
+    /// Wall time of a decision.
     #[serde(default)]
-    pub(crate) decision_us: DecisionTimes,
-    pub(crate) time_s: SolveTimes,
+    pub decision_us: DecisionTimes,
+    /// Wall time by phase.
+    pub time_s: SolveTimes,
+    /// Where times were taken.
     #[serde(default)]
-    pub(crate) machine: Machine,
+    pub machine: Machine,
     /// The job that measured it.
     #[serde(default)]
-    pub(crate) job: String,
+    pub job: String,
+}
+
+/// Why results cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ResultError {
+    /// The file is not there, or a line of it is no result.
+    #[error("{}{problem}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The line and what is wrong with it.
+        problem: String,
+    },
 }
 
 /// Where times were taken.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Machine {
+pub struct Machine {
     /// Model of the processor; empty if the system does not tell.
-    pub(crate) cpu: String,
+    pub cpu: String,
     /// Cores of the whole machine.
-    pub(crate) cores: usize,
+    pub cores: usize,
 }
 
 /// What results were made with before there was a choice.
-pub(crate) fn default_regions() -> String {
+#[must_use]
+pub fn default_regions() -> String {
     "net".to_owned()
 }
 
 fn default_variant() -> String {
-    variant(Switch::On, Switch::On)
+    Variant::WHOLE.name()
 }
 
 fn default_simulator() -> String {
     "rapier2d".to_owned()
 }
 
-/// The name of what was switched off.
-pub(crate) fn variant(recovery: Switch, cost_update: Switch) -> String {
-    let off = [("no_recovery", recovery), ("no_cost_update", cost_update)];
-    let off: Vec<&str> =
-        off.iter().filter(|(_, switch)| *switch == Switch::Off).map(|&(name, _)| name).collect();
-    if off.is_empty() { "default".to_owned() } else { off.join("+") }
+/// Which parts of SHARP ran; the ablations leave some out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// Whether a robot that left its plan looked for a new one.
+    pub has_recovery: bool,
+    /// Whether the search learnt from what options turned out to cost.
+    pub has_cost_update: bool,
+}
+
+impl Variant {
+    /// Everything on.
+    pub const WHOLE: Self = Self { has_recovery: true, has_cost_update: true };
+
+    /// `default`, or what is off: `no_recovery`, `no_cost_update`, or both with a plus between.
+    #[must_use]
+    pub fn name(self) -> String {
+        let parts = [("no_recovery", self.has_recovery), ("no_cost_update", self.has_cost_update)];
+        let off: Vec<&str> = parts.iter().filter(|(_, is_on)| !is_on).map(|&(name, _)| name).collect();
+        if off.is_empty() { "default".to_owned() } else { off.join("+") }
+    }
 }
 
 impl ResultLine {
-    pub(crate) const fn tally(&self) -> SuccessCount {
+    /// Its executions and how many reached the goal.
+    #[must_use]
+    pub const fn tally(&self) -> SuccessCount {
         SuccessCount { episodes: self.episodes, successes: self.successes }
     }
 
-    pub(crate) fn is_solved(&self) -> bool {
+    /// Returns true if there is a plan.
+    #[must_use]
+    pub fn is_solved(&self) -> bool {
         self.status == "solved"
     }
 
-    pub(crate) fn is_of_sharp(&self) -> bool {
+    /// Returns true for SHARP, false for the systems to compare with.
+    #[must_use]
+    pub fn is_of_sharp(&self) -> bool {
         self.method == "sharp"
     }
 
     /// Where the plan lies below the folder of the evaluation.
-    pub(crate) fn plan_folder(&self, out: &Path) -> PathBuf {
+    #[must_use]
+    pub fn plan_folder(&self, out: &Path) -> PathBuf {
         problem_folder(out, &self.job, self.problem)
     }
 }
 
 /// Where everything of one problem of one job lies below the folder of the evaluation.
-pub(crate) fn problem_folder(out: &Path, job: &str, problem: usize) -> PathBuf {
+#[must_use]
+pub fn problem_folder(out: &Path, job: &str, problem: usize) -> PathBuf {
     out.join("jobs").join(job).join(format!("p{problem}"))
 }
 
@@ -119,8 +179,8 @@ pub(crate) fn problem_folder(out: &Path, job: &str, problem: usize) -> PathBuf {
 ///
 /// # Errors
 /// Returns an error if there is no such file, or that names the first line that is no result.
-pub(crate) fn read_baselines(path: &Path) -> Result<Vec<ResultLine>, Failure> {
-    let broken = |problem: String| Failure::new("FILE_INVALID", format!("{}{problem}", path.display()));
+pub fn read_baselines(path: &Path) -> Result<Vec<ResultLine>, ResultError> {
+    let broken = |problem: String| ResultError::Unreadable { path: path.to_owned(), problem };
     let text = std::fs::read_to_string(path).map_err(|error| broken(format!(": {error}")))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
     let mut lines: Vec<ResultLine> = whole
@@ -135,7 +195,8 @@ pub(crate) fn read_baselines(path: &Path) -> Result<Vec<ResultLine>, Failure> {
 }
 
 /// One result for the terminal.
-pub(crate) fn row_text(line: &ResultLine) -> String {
+#[must_use]
+pub fn row_text(line: &ResultLine) -> String {
     let ResultLine { env, problem, robot, method, successes, episodes, .. } = line;
     if !line.is_of_sharp() {
         return format!("{env} P{problem} {robot} {method}: {successes} of {episodes}");
@@ -155,10 +216,10 @@ pub(crate) fn row_text(line: &ResultLine) -> String {
     )
 }
 
-#[cfg(test)]
 impl ResultLine {
-    /// A made-up result, solved and driven without a failure.
-    pub(crate) fn example(env: &str, robot: &str, kind: &str, problem: usize) -> Self {
+    /// A made-up result, solved and driven without a failure: for tests and examples.
+    #[must_use]
+    pub fn example(env: &str, robot: &str, kind: &str, problem: usize) -> Self {
         Self {
             schema: "sharp.result/1".into(),
             version: "0.1.0".into(),
@@ -198,13 +259,12 @@ impl ResultLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::outcome::to_json;
 
     #[test]
     fn a_baseline_cut_short_is_left_out() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("baselines.jsonl");
-        let of_sharp = to_json(&ResultLine::example("a", "limo", "centroid", 3));
+        let of_sharp = serde_json::to_string(&ResultLine::example("a", "limo", "centroid", 3)).expect("JSON");
         let line = of_sharp.replace("\"method\":\"sharp\"", "\"method\":\"rrt\"");
         std::fs::write(&path, format!("{of_sharp}\n{line}\n{}", &line[..30])).expect("a file");
         let lines = read_baselines(&path).expect("whole lines");
@@ -217,9 +277,9 @@ mod tests {
 
     #[test]
     fn variants_name_what_is_off() {
-        let names = [(Switch::On, Switch::On), (Switch::Off, Switch::On), (Switch::Off, Switch::Off)];
+        let names = [(true, true), (false, true), (false, false)];
         assert_eq!(
-            names.map(|(recovery, cost_update)| variant(recovery, cost_update)),
+            names.map(|(has_recovery, has_cost_update)| Variant { has_recovery, has_cost_update }.name()),
             ["default", "no_recovery", "no_recovery+no_cost_update"]
         );
     }

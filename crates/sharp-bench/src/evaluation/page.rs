@@ -8,8 +8,8 @@ use sharp_draw::escape;
 use super::cases::{Results, Setting, tally};
 use super::figure::{Figure, Table};
 use super::gallery::Gallery;
-use super::lines::ResultLine;
 use super::missing::Missing;
+use crate::result::ResultLine;
 
 const STYLE: &str = include_str!("page.css");
 

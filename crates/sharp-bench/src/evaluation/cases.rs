@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use sharp_drive::SuccessCount;
 
 use super::figure::Style;
-use super::lines::ResultLine;
+use crate::result::ResultLine;
 
 /// How a result of SHARP was made, apart from its problem, its kind of option and its trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,9 +28,9 @@ impl<'a> Setting<'a> {
 }
 
 /// A problem: environment, robot and number.
-pub(super) type Problem<'a> = (&'a str, &'a str, usize);
+pub(super) type ProblemKey<'a> = (&'a str, &'a str, usize);
 
-pub(super) fn problem(line: &ResultLine) -> Problem<'_> {
+pub(super) fn problem(line: &ResultLine) -> ProblemKey<'_> {
     (&line.env, &line.robot, line.problem)
 }
 
@@ -99,7 +99,7 @@ fn without_repeats<'a>(lines: &[&'a ResultLine]) -> Vec<&'a ResultLine> {
 
 /// One method on one problem, all trials together.
 #[derive(Clone, Debug)]
-pub(super) struct Case<'a> {
+pub(super) struct MethodCase<'a> {
     pub(super) env: &'a str,
     pub(super) robot: &'a str,
     pub(super) problem: usize,
@@ -115,7 +115,7 @@ pub(super) struct Case<'a> {
 }
 
 /// The cases of `lines`, by environment, robot, problem and method.
-pub(super) fn cases<'a>(lines: &[&'a ResultLine]) -> Vec<Case<'a>> {
+pub(super) fn cases<'a>(lines: &[&'a ResultLine]) -> Vec<MethodCase<'a>> {
     let mut groups: BTreeMap<_, Vec<&'a ResultLine>> = BTreeMap::new();
     for line in lines {
         let method = method(line);
@@ -125,7 +125,7 @@ pub(super) fn cases<'a>(lines: &[&'a ResultLine]) -> Vec<Case<'a>> {
         .into_iter()
         .map(|(((env, robot, problem), _, method), lines)| {
             let arrived = lines.iter().filter(|line| line.successes > 0);
-            Case {
+            MethodCase {
                 env,
                 robot,
                 problem,

@@ -6,17 +6,17 @@ use sharp_draw::numbers::{plain, seconds};
 use sharp_draw::{Axis, Color, LegendItem, Marker, Panel, legend};
 
 use super::figure::{Figure, LABEL, Table, heading};
-use super::lines::ResultLine;
-use crate::report::SolveTimes;
+use crate::result::ResultLine;
+use crate::times::SolveTimes;
 
 const BAR: f64 = 13.0;
 const HEADER: f64 = 20.0;
 
 /// A phase: its name, its colour, and how long it took.
-type Phase = (&'static str, Color, fn(&SolveTimes) -> f64);
+type TimedPhase = (&'static str, Color, fn(&SolveTimes) -> f64);
 
 /// Phases in the order of the algorithm.
-const PHASES: [Phase; 7] = [
+const PHASES: [TimedPhase; 7] = [
     ("regions", Color::hex(0xcc79a7), |time| time.regions),
     ("abstraction", Color::hex(0xe69f00), |time| time.abstraction),
     ("search", Color::hex(0xf0e442), |time| time.search),

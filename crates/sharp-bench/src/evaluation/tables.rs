@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::cases::Results;
 use super::figure::{Figure, Table};
-use super::lines::ResultLine;
+use crate::result::ResultLine;
 
 /// The numbers of every figure, and one row for every result of SHARP in the setting of the page.
 pub(super) fn document(results: &Results<'_>, figures: &[Figure]) -> String {
@@ -28,10 +28,10 @@ fn markdown(table: &Table) -> String {
 }
 
 /// A column: its name, and what a result has in it.
-type Column = (&'static str, fn(&ResultLine) -> String);
+type ResultColumn = (&'static str, fn(&ResultLine) -> String);
 
 /// What a result of SHARP may differ in besides its problem.
-const SETTINGS: [Column; 6] = [
+const SETTINGS: [ResultColumn; 6] = [
     ("learning", |line| line.learning.clone()),
     ("regions", |line| line.regions.clone()),
     ("noise", |line| line.noise.clone()),
@@ -41,9 +41,10 @@ const SETTINGS: [Column; 6] = [
 ];
 
 /// One row a result, with a column for every setting in which some of them differ.
-pub(crate) fn table(lines: &[&ResultLine]) -> String {
-    let differs = |(_, of): &Column| lines.windows(2).any(|pair| of(pair[0]) != of(pair[1]));
-    let settings: Vec<Column> = SETTINGS.into_iter().filter(differs).collect();
+#[must_use]
+pub fn table(lines: &[&ResultLine]) -> String {
+    let differs = |(_, of): &ResultColumn| lines.windows(2).any(|pair| of(pair[0]) != of(pair[1]));
+    let settings: Vec<ResultColumn> = SETTINGS.into_iter().filter(differs).collect();
     let mut columns = vec!["env", "problem", "robot", "options"];
     columns.extend(settings.iter().map(|(name, _)| name));
     columns.extend(["success", "95 % interval", "predicted", "reused", "driving s", "regions s"]);

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use sharp_draw::numbers::{percent, plain, seconds};
 use sharp_draw::{Axis, Panel};
 
-use super::cases::{Mean, Problem, Results, Setting, problem, ready_s, tally};
+use super::cases::{Mean, ProblemKey, Results, Setting, problem, ready_s, tally};
 use super::figure::{Figure, LABEL, Style, Table, heading, marker, method_legend, noted};
-use super::lines::ResultLine;
+use crate::result::ResultLine;
 
 const ROW: f64 = 13.0;
 const HEADER: f64 = 20.0;
@@ -109,7 +109,7 @@ fn rows<'a>(ablation: &Ablation, results: &Results<'a>) -> Vec<Row<'a>> {
     let row = |(robot, options): (&'a str, &'a str)| {
         let of = |lines: &[&'a ResultLine], others: &[&'a ResultLine]| {
             let is_wanted = |line: &&ResultLine| line.robot == robot && line.options == options;
-            let problems: BTreeSet<Problem<'_>> =
+            let problems: BTreeSet<ProblemKey<'_>> =
                 others.iter().copied().filter(is_wanted).map(problem).collect();
             let shared = |line: &&'a ResultLine| is_wanted(line) && problems.contains(&problem(line));
             lines.iter().copied().filter(shared).collect::<Vec<_>>()
@@ -195,7 +195,7 @@ fn table(rows: &[Row<'_>]) -> Table {
     ];
     let row = |row: &Row<'_>| {
         let (without, whole) = (tally(&row.without), tally(&row.whole));
-        let problems: BTreeSet<Problem<'_>> = row.without.iter().map(|line| problem(line)).collect();
+        let problems: BTreeSet<ProblemKey<'_>> = row.without.iter().map(|line| problem(line)).collect();
         let solved = row.without.iter().filter(|line| line.is_solved()).count();
         vec![
             row.name.to_owned(),

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use sharp_drive::SuccessCount;
 
 use super::cases::ready_s;
-use super::lines::{ResultLine, default_regions};
+use crate::result::{ResultLine, default_regions};
 
 /// Sums over some results.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,7 +53,8 @@ pub(super) fn tables(lines: &[&ResultLine]) -> String {
 }
 
 /// One row for each method, noise and robot.
-pub(crate) fn totals(lines: &[&ResultLine]) -> String {
+#[must_use]
+pub fn totals(lines: &[&ResultLine]) -> String {
     let noises = distinct(lines.iter().map(|line| line.noise.clone()));
     let mut text = String::from(
         "| method | noise | robot | success | 95 % interval | collisions | timeouts | driving s | ready after s | decision us |\n|---|---|---|---|---|---|---|---|---|---|\n",
