@@ -9,7 +9,9 @@ use sharp_plan::conformance::check_option_learner;
 use sharp_plan::{Answer, LearnFailure, LearningMonitor, LearningTask, LearntPolicy, Method, OptionLearner};
 use sharp_plan::{Query, Sharp};
 use sharp_sim::{NoiseModel, RobotModel};
-use sharp_space::{Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose, Region, RegionDetector, RegionId};
+use sharp_space::{
+    Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose, Region, RegionDetector, RegionId,
+};
 
 /// Takes the cautious follower and says how often it succeeds.
 #[derive(Debug)]

@@ -61,14 +61,24 @@ const ROOMS: [Room; 16] = [
         ],
         &["sharp-regions"],
     ),
+    // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
+    room(5, "sharp-draw", &["sharp-space"], &[]),
+    // Reports of suites have figures.
     room(
         5,
         "sharp-bench",
-        &["sharp-space", "sharp-sim", "sharp-motion", "sharp-guide", "sharp-rl", "sharp-drive", "sharp-plan"],
-        &[],
+        &[
+            "sharp-space",
+            "sharp-sim",
+            "sharp-motion",
+            "sharp-guide",
+            "sharp-rl",
+            "sharp-drive",
+            "sharp-plan",
+            "sharp-draw",
+        ],
+        &["sharp-maps"],
     ),
-    // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
-    room(5, "sharp-draw", &["sharp-space"], &[]),
     room(6, "sharp-cli", LIBRARIES, LIBRARIES),
     room(6, "sharp-tests", LIBRARIES, LIBRARIES),
     room(6, "xtask", &[], &[]),
