@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-pub(crate) use suites::{Contender, Engine, Eval, Jobs, Selection, Submit, Suite};
+pub(crate) use suites::{Engine, Eval, Jobs, Submit, Suite, SuiteSelection, SystemName};
 
 /// Samples of one plan of the baseline `rrt`, unless asked otherwise.
 pub(crate) const RRT_SAMPLES: usize = 30_000;
@@ -29,11 +29,11 @@ pub(crate) struct Cli {
     #[arg(long, global = true, value_name = "N")]
     pub(crate) threads: Option<usize>,
     #[command(subcommand)]
-    pub(crate) command: Command,
+    pub(crate) command: Subcommands,
 }
 
 #[derive(Debug, Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum Subcommands {
     /// Solve a path planning problem: regions, abstraction, search, learning, a policy on disk.
     Solve(Solve),
     /// Run a solved plan in a simulator and count how often it holds.
@@ -409,7 +409,7 @@ pub(crate) enum Library {
 
 /// A system to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Method {
+pub(crate) enum BaselineName {
     /// The paper's: RRT, executed open-loop, planned anew from where it ended.
     Rrt,
     /// A drivable path, tracked in closed loop, planned anew on deviation.
@@ -420,7 +420,7 @@ pub(crate) enum Method {
     Sac,
 }
 
-impl Method {
+impl BaselineName {
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Rrt => "rrt",
@@ -434,8 +434,8 @@ impl Method {
 #[derive(Debug, Args)]
 pub(crate) struct Baseline {
     /// The system.
-    #[arg(value_enum)]
-    pub(crate) method: Method,
+    #[arg(value_enum, value_name = "METHOD")]
+    pub(crate) system: BaselineName,
     #[command(flatten)]
     pub(crate) map: MapArgs,
     /// husky, limo or a robot file (.ron).

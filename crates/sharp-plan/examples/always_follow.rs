@@ -9,7 +9,9 @@ use sharp_plan::conformance::check_option_learner;
 use sharp_plan::{Answer, LearnFailure, LearningMonitor, LearningTask, LearntPolicy, Method, OptionLearner};
 use sharp_plan::{Query, Sharp};
 use sharp_sim::{NoiseModel, RobotModel};
-use sharp_space::{Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose, Region, RegionDetector, RegionId};
+use sharp_space::{
+    Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose, Region, RegionDetector, RegionId,
+};
 
 /// Takes the cautious follower and says how often it succeeds.
 #[derive(Debug)]
@@ -31,7 +33,7 @@ impl RegionDetector for Halves {
         let (frame, field) = (grid.frame(), DistanceField::new(grid));
         let column = |id: u32| frame.width * (1 + 2 * id as usize) / 4;
         let region = |id| Region::new(RegionId(id), vec![Cell::new(column(id), frame.height / 2)], &field);
-        Detection::new((0..2).filter_map(|id| region(id).ok()).collect(), "halves")
+        Detection::new((0..2).filter_map(region).collect(), "halves")
     }
 }
 

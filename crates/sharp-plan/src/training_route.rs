@@ -78,7 +78,7 @@ pub fn training_routes(
     seed: Seed,
 ) -> Vec<TrainingRoute> {
     let search = SearchSettings { bypasses: false, ..SearchSettings::default() };
-    let method = Method { search, ..Method::prior() };
+    let method = Method { search, ..Method::default() };
     let route = |query: &Query| {
         let mut search = Search::new(world, abstraction, &method, *query, [], seed).ok()?;
         let options = search.plan(&|_| None, &())?;

@@ -63,14 +63,23 @@ const ROOMS: [Room; 16] = [
         ],
         &["sharp-regions"],
     ),
+    // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
+    room(5, "sharp-draw", &["sharp-space"], &[]),
     room(
         5,
         "sharp-bench",
-        &["sharp-space", "sharp-sim", "sharp-motion", "sharp-guide", "sharp-rl", "sharp-drive", "sharp-plan"],
-        &[],
+        &[
+            "sharp-space",
+            "sharp-sim",
+            "sharp-motion",
+            "sharp-guide",
+            "sharp-rl",
+            "sharp-drive",
+            "sharp-plan",
+            "sharp-draw",
+        ],
+        &["sharp-maps"],
     ),
-    // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
-    room(5, "sharp-draw", &["sharp-space"], &[]),
     room(6, "sharp-cli", LIBRARIES, LIBRARIES),
     room(6, "sharp-tests", LIBRARIES, LIBRARIES),
     room(6, "xtask", &[], &[]),
@@ -94,7 +103,6 @@ const LIBRARIES: &[&str] = &[
     "sharp-plan",
     "sharp-bench",
     "sharp-draw",
-    "sharp-bench",
 ];
 
 /// Families of heavy packages, by the beginning of their names, and the crates that may name them.

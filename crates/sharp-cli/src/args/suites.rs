@@ -10,7 +10,7 @@ use super::{Kind, Learning, Switch};
 #[derive(Debug, Args)]
 pub(crate) struct Eval {
     #[command(flatten)]
-    pub(crate) selection: Selection,
+    pub(crate) selection: SuiteSelection,
     /// Where results are written; a run that was stopped goes on where it was.
     #[arg(long, value_name = "DIR", default_value = "out/eval")]
     pub(crate) out: PathBuf,
@@ -37,7 +37,7 @@ pub(crate) enum Engine {
 
 /// A suite of problems, or a part of it.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct Selection {
+pub(crate) struct SuiteSelection {
     /// Which suite.
     #[arg(value_enum, default_value_t = Suite::Smoke)]
     pub(crate) suite: Suite,
@@ -68,7 +68,7 @@ pub(crate) struct Selection {
     pub(crate) problems: Vec<usize>,
     /// These methods instead of the suite's, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',')]
-    pub(crate) methods: Vec<Contender>,
+    pub(crate) methods: Vec<SystemName>,
     /// Independent repetitions [default: 1; 5 in `paper`].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) trials: Option<u32>,
@@ -97,7 +97,7 @@ pub(crate) enum Suite {
 /// What a suite measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Contender {
+pub(crate) enum SystemName {
     /// This project.
     Sharp,
     /// RRT with replanning; a contact is a failure.
@@ -118,7 +118,7 @@ pub(crate) enum Jobs {
     /// Write DIR/manifest.jsonl: one line a job. Jobs that are planned already stay as they are.
     Plan {
         #[command(flatten)]
-        selection: Selection,
+        selection: SuiteSelection,
         /// The folder that all jobs share.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,

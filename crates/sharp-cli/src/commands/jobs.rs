@@ -5,7 +5,7 @@ use std::path::Path;
 
 use sharp_bench::{ResultLine, row_text};
 
-use crate::args::{Jobs, Selection, Submit};
+use crate::args::{Jobs, Submit, SuiteSelection};
 use crate::commands::eval::write_report;
 use crate::jobs::{Cluster, Ended, Manifest, Submission, clean, command, merge, run_job, specs, unfinished};
 use crate::outcome::{Exit, Failure, say, to_json};
@@ -19,7 +19,7 @@ pub(crate) fn run(jobs: &Jobs, seed: u64, json: bool) -> Result<Exit, Failure> {
     }
 }
 
-fn plan(selection: &Selection, out: &Path, seed: u64) -> Result<Exit, Failure> {
+fn plan(selection: &SuiteSelection, out: &Path, seed: u64) -> Result<Exit, Failure> {
     let command = command("jobs plan", selection, seed) + &format!(" --out {}", out.display());
     let (manifest, indices) = Manifest::extend(out, specs(selection, seed)?, &command)?;
     let weight_s: f64 = indices.iter().map(|&index| manifest.jobs[index].weight_s).sum();

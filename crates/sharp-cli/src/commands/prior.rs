@@ -48,7 +48,7 @@ const HELD_OUT: [FloorplanKind; 4] = [
 
 /// `sharp.prior.train/1`.
 #[derive(Serialize)]
-struct TrainReport {
+struct PriorTrainReport {
     schema: &'static str,
     robot: String,
     seed: u64,
@@ -58,11 +58,11 @@ struct TrainReport {
     env_steps: u64,
     gradient_steps: u64,
     success: f64,
-    time_s: TrainTimes,
+    time_s: PriorTrainTimes,
 }
 
 #[derive(Serialize)]
-struct TrainTimes {
+struct PriorTrainTimes {
     courses: f64,
     train: f64,
     total: f64,
@@ -70,7 +70,7 @@ struct TrainTimes {
 
 /// `sharp.prior.score/1`.
 #[derive(Serialize)]
-struct ScoreReport {
+struct PriorScoreReport {
     schema: &'static str,
     robot: String,
     noise: String,
@@ -113,7 +113,7 @@ fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> 
     // Only now: a crash before would have lost both.
     let _ = std::fs::remove_file(checkpoint(args));
     let total = begun.elapsed().as_secs_f64();
-    let report = TrainReport {
+    let report = PriorTrainReport {
         schema: "sharp.prior.train/1",
         robot: robot.name,
         seed,
@@ -123,7 +123,7 @@ fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> 
         env_steps: trained.env_steps,
         gradient_steps: trained.updates,
         success: trained.evaluation.success_rate(),
-        time_s: TrainTimes { courses: courses_s, train: total - courses_s, total },
+        time_s: PriorTrainTimes { courses: courses_s, train: total - courses_s, total },
     };
     if json {
         say!("{}", to_json(&report));
@@ -287,7 +287,7 @@ fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> 
         policies.insert(name, policy_score(&trials));
     }
     let legs = courses.iter().map(TrainingRoute::len).sum();
-    let report = ScoreReport {
+    let report = PriorScoreReport {
         schema: "sharp.prior.score/1",
         robot: robot.name,
         noise: args.noise.clone(),

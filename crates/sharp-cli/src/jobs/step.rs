@@ -22,7 +22,7 @@ pub(super) const UNFINISHED: &str = ".tmp";
 
 /// One problem of one job, done or not.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Step<'a> {
+pub(super) struct JobStep<'a> {
     pub(super) dir: &'a Path,
     pub(super) job: &'a Job,
     pub(super) problem: usize,
@@ -45,7 +45,7 @@ struct Header {
     blake3: String,
 }
 
-impl Step<'_> {
+impl JobStep<'_> {
     /// Everything of this step.
     pub(super) fn folder(&self) -> PathBuf {
         problem_folder(self.dir, &self.job.name, self.problem)
@@ -83,7 +83,7 @@ impl Step<'_> {
     /// Returns an error of `work`, or if files cannot be written.
     pub(super) fn make(
         &self,
-        before: Option<&Step<'_>>,
+        before: Option<&JobStep<'_>>,
         work: impl FnOnce(&Path, &Path) -> Result<Option<ResultLine>, Failure>,
     ) -> Result<Option<Done>, Failure> {
         let made = self.make_apart(before, work);
@@ -97,7 +97,7 @@ impl Step<'_> {
 
     fn make_apart(
         &self,
-        before: Option<&Step<'_>>,
+        before: Option<&JobStep<'_>>,
         work: impl FnOnce(&Path, &Path) -> Result<Option<ResultLine>, Failure>,
     ) -> Result<(), Failure> {
         let folder = self.folder();
@@ -200,7 +200,7 @@ mod tests {
     fn a_step_that_was_broken_off_has_never_been() {
         let folder = tempfile::tempdir().expect("a folder");
         let manifest = manifest(folder.path());
-        let step = |problem| Step { dir: &manifest.dir, job: &manifest.jobs[0], problem };
+        let step = |problem| JobStep { dir: &manifest.dir, job: &manifest.jobs[0], problem };
         let (first, second) = (step(1), step(2));
         let broken = first.make(None, |_, library| {
             learn(library, 0);
@@ -228,7 +228,7 @@ mod tests {
     fn who_comes_second_takes_the_first_ones_result() {
         let folder = tempfile::tempdir().expect("a folder");
         let manifest = manifest(folder.path());
-        let step = Step { dir: &manifest.dir, job: &manifest.jobs[0], problem: 1 };
+        let step = JobStep { dir: &manifest.dir, job: &manifest.jobs[0], problem: 1 };
         let second = step.make(None, |_, _| {
             let first = step.make(None, |_, _| Ok(Some(ResultLine { successes: 7, ..line(1) })));
             assert_eq!(first.expect("no error").expect("a result").line.successes, 7);
@@ -243,9 +243,9 @@ mod tests {
     fn damage_and_results_of_other_jobs_are_named() {
         let folder = tempfile::tempdir().expect("a folder");
         let manifest = manifest(folder.path());
-        let step = Step { dir: &manifest.dir, job: &manifest.jobs[0], problem: 1 };
+        let step = JobStep { dir: &manifest.dir, job: &manifest.jobs[0], problem: 1 };
         step.make(None, |_, _| Ok(Some(line(1)))).expect("a result");
-        let other = Step { problem: 2, ..step };
+        let other = JobStep { problem: 2, ..step };
         fs::create_dir_all(other.folder()).expect("a folder");
         let path = step.folder().join("result.jsonl");
         fs::copy(&path, other.folder().join("result.jsonl")).expect("a file");

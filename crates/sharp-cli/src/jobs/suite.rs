@@ -4,14 +4,14 @@ use clap::ValueEnum;
 use sharp_space::Seed;
 
 use super::spec::{Inputs, SharpSpec, Spec, version};
-use crate::args::{Contender, Kind, Learning, Selection, Suite};
+use crate::args::{Kind, Learning, Suite, SuiteSelection, SystemName};
 use crate::outcome::Failure;
 
 /// The jobs that `selection` asks for, in the order of their results; `seed` is the root of trial 0.
 ///
 /// # Errors
 /// Returns an error if a name selects nothing, or an input cannot be read.
-pub(crate) fn specs(selection: &Selection, seed: u64) -> Result<Vec<Spec>, Failure> {
+pub(crate) fn specs(selection: &SuiteSelection, seed: u64) -> Result<Vec<Spec>, Failure> {
     check(selection)?;
     let mut specs = Vec::new();
     for env in chosen("--envs", &selection.envs, &envs(selection.suite))? {
@@ -19,7 +19,7 @@ pub(crate) fn specs(selection: &Selection, seed: u64) -> Result<Vec<Spec>, Failu
         for robot in chosen("--robots", &selection.robots, robots(selection.suite))? {
             for noise in &selection.noise {
                 let inputs = Inputs::read(&env, &robot, noise, Some(&selection.regions))?;
-                let world = World { env: &env, robot: &robot, noise, problems: &problems, inputs };
+                let world = SuiteWorld { env: &env, robot: &robot, noise, problems: &problems, inputs };
                 specs.extend(world.specs(selection, seed));
             }
         }
@@ -28,7 +28,7 @@ pub(crate) fn specs(selection: &Selection, seed: u64) -> Result<Vec<Spec>, Failu
 }
 
 /// Where all methods are measured beside each other.
-struct World<'a> {
+struct SuiteWorld<'a> {
     env: &'a str,
     robot: &'a str,
     noise: &'a str,
@@ -36,21 +36,21 @@ struct World<'a> {
     inputs: Inputs,
 }
 
-impl World<'_> {
+impl SuiteWorld<'_> {
     /// All methods in each trial.
-    fn specs(&self, selection: &Selection, seed: u64) -> Vec<Spec> {
+    fn specs(&self, selection: &SuiteSelection, seed: u64) -> Vec<Spec> {
         let trials = selection.trials.unwrap_or(if selection.suite == Suite::Paper { 5 } else { 1 });
-        let methods = contenders(selection);
-        let all = (0..trials).flat_map(|trial| methods.iter().map(move |method| (trial, method)));
-        all.map(|(trial, (method, sharp))| self.spec(selection, (trial, seed), *method, sharp.clone()))
+        let systems = contenders(selection);
+        let all = (0..trials).flat_map(|trial| systems.iter().map(move |system| (trial, system)));
+        all.map(|(trial, (system, sharp))| self.spec(selection, (trial, seed), *system, sharp.clone()))
             .collect()
     }
 
     fn spec(
         &self,
-        selection: &Selection,
+        selection: &SuiteSelection,
         (trial, seed): (u32, u64),
-        method: Contender,
+        system: SystemName,
         sharp: Option<SharpSpec>,
     ) -> Spec {
         let regions = self.inputs.regions.clone().filter(|_| sharp.is_some());
@@ -58,7 +58,7 @@ impl World<'_> {
             version: version().to_owned(),
             env: self.env.to_owned(),
             robot: self.robot.to_owned(),
-            method,
+            system,
             sharp,
             noise: self.noise.to_owned(),
             trial,
@@ -72,8 +72,8 @@ impl World<'_> {
 }
 
 /// The call of `sharp SUBCOMMAND` that asks for the same jobs.
-pub(crate) fn command(subcommand: &str, selection: &Selection, seed: u64) -> String {
-    let Selection { suite, episodes, regions, time_limit, .. } = selection;
+pub(crate) fn command(subcommand: &str, selection: &SuiteSelection, seed: u64) -> String {
+    let SuiteSelection { suite, episodes, regions, time_limit, .. } = selection;
     let mut text = format!(
         "sharp --seed {seed} {subcommand} {} --episodes {episodes} --noise {} --regions {regions} \
          --recovery {} --cost-update {} --time-limit {time_limit}",
@@ -114,7 +114,7 @@ fn trial_seed(root: u64, trial: u32) -> u64 {
     if trial == 0 { root } else { Seed(root).child("trial", u64::from(trial)).0 & EXACT_BITS }
 }
 
-fn check(selection: &Selection) -> Result<(), Failure> {
+fn check(selection: &SuiteSelection) -> Result<(), Failure> {
     let limit_s = selection.time_limit;
     if limit_s.is_finite() && limit_s > 0.0 {
         return Ok(());
@@ -146,7 +146,7 @@ fn chosen(flag: &str, names: &[String], known: &[&str]) -> Result<Vec<String>, F
     Ok(known.iter().filter(|name| is_chosen(name)).map(|&name| name.to_owned()).collect())
 }
 
-fn problems(env: &str, selection: &Selection) -> Result<Vec<usize>, Failure> {
+fn problems(env: &str, selection: &SuiteSelection) -> Result<Vec<usize>, Failure> {
     let count = sharp_maps::load(env, &sharp_maps::LoadOptions::default())?.problems.len();
     if let Some(number) = selection.problems.iter().find(|&&number| !(1..=count).contains(&number)) {
         return Err(Failure::new("USAGE", format!("--problems: environment {env} has no problem {number}")));
@@ -156,29 +156,31 @@ fn problems(env: &str, selection: &Selection) -> Result<Vec<usize>, Failure> {
 }
 
 /// The methods on one environment: SHARP in all its settings, then the baselines.
-fn contenders(selection: &Selection) -> Vec<(Contender, Option<SharpSpec>)> {
+fn contenders(selection: &SuiteSelection) -> Vec<(SystemName, Option<SharpSpec>)> {
     let methods = match selection.suite {
         _ if !selection.methods.is_empty() => &selection.methods[..],
-        Suite::Smoke | Suite::Quick => &[Contender::Sharp, Contender::Rrt, Contender::Track, Contender::Mppi],
+        Suite::Smoke | Suite::Quick => {
+            &[SystemName::Sharp, SystemName::Rrt, SystemName::Track, SystemName::Mppi]
+        }
         Suite::Paper => &[
-            Contender::Sharp,
-            Contender::Rrt,
-            Contender::RrtContact,
-            Contender::Track,
-            Contender::Mppi,
-            Contender::Sac,
+            SystemName::Sharp,
+            SystemName::Rrt,
+            SystemName::RrtContact,
+            SystemName::Track,
+            SystemName::Mppi,
+            SystemName::Sac,
         ],
     };
-    let settings = |&method: &Contender| match method {
-        Contender::Sharp => {
-            sharp_settings(selection).into_iter().map(|sharp| (method, Some(sharp))).collect()
+    let settings = |&system: &SystemName| match system {
+        SystemName::Sharp => {
+            sharp_settings(selection).into_iter().map(|sharp| (system, Some(sharp))).collect()
         }
-        _ => vec![(method, None)],
+        _ => vec![(system, None)],
     };
     methods.iter().flat_map(settings).collect()
 }
 
-fn sharp_settings(selection: &Selection) -> Vec<SharpSpec> {
+fn sharp_settings(selection: &SuiteSelection) -> Vec<SharpSpec> {
     let learning = match selection.suite {
         _ if !selection.learning.is_empty() => &selection.learning[..],
         Suite::Paper => &[Learning::Fast, Learning::Paper],
@@ -200,11 +202,11 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::args::{Cli, Command};
+    use crate::args::{Cli, Subcommands};
 
     fn specs_of(flags: &str) -> Result<Vec<Spec>, Failure> {
         let cli = Cli::parse_from(format!("sharp eval {flags}").split_whitespace());
-        let Command::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
+        let Subcommands::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
         specs(&args.selection, cli.seed)
     }
 
@@ -214,7 +216,7 @@ mod tests {
                     --cost-update on --time-limit 60 --learning fast,paper --envs a,b --options interface \
                     --problems 1,3 --methods sharp,rrt-contact --trials 2";
         let cli = Cli::parse_from(text.split_whitespace());
-        let Command::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
+        let Subcommands::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
         assert_eq!(command("eval", &args.selection, cli.seed), text);
     }
 

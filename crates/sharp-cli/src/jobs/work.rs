@@ -13,10 +13,10 @@ use sharp_space::Seed;
 use super::machine::machine;
 use super::manifest::Job;
 use super::spec::{SharpSpec, Spec, map_args, word};
-use super::step::Step;
+use super::step::JobStep;
 use crate::args::{
-    AbstractionArgs, Baseline, Collisions, Contender, Guide, MAX_ENV_STEPS, Method, Metric, RRT_SAMPLES,
-    Solve, Switch,
+    AbstractionArgs, Baseline, BaselineName, Collisions, Guide, MAX_ENV_STEPS, Metric, RRT_SAMPLES, Solve,
+    Switch, SystemName,
 };
 use crate::commands::baseline::{BaselineReport, measure};
 use crate::commands::solve::{Solved, solve_problem};
@@ -45,7 +45,7 @@ pub(crate) fn run_job(dir: &Path, job: &Job, watch: &dyn Fn(&ResultLine)) -> Res
 }
 
 fn run_steps(dir: &Path, job: &Job, watch: &dyn Fn(&ResultLine)) -> Result<Ended, Failure> {
-    let steps: Vec<Step<'_>> = steps(dir, job).collect();
+    let steps: Vec<JobStep<'_>> = steps(dir, job).collect();
     let mut is_checked = false;
     for (index, step) in steps.iter().enumerate() {
         let done = match step.read()? {
@@ -66,12 +66,12 @@ fn run_steps(dir: &Path, job: &Job, watch: &dyn Fn(&ResultLine)) -> Result<Ended
 }
 
 /// The problems of `job` below `dir`, in order.
-pub(super) fn steps<'a>(dir: &'a Path, job: &'a Job) -> impl Iterator<Item = Step<'a>> {
-    job.spec.problems.iter().map(move |&problem| Step { dir, job, problem })
+pub(super) fn steps<'a>(dir: &'a Path, job: &'a Job) -> impl Iterator<Item = JobStep<'a>> {
+    job.spec.problems.iter().map(move |&problem| JobStep { dir, job, problem })
 }
 
 /// Solves and drives one problem in `folder`; `None` if it was interrupted.
-fn result(step: &Step<'_>, folder: &Path, library: &Path) -> Result<Option<ResultLine>, Failure> {
+fn result(step: &JobStep<'_>, folder: &Path, library: &Path) -> Result<Option<ResultLine>, Failure> {
     let spec = &step.job.spec;
     let line = match &spec.sharp {
         Some(sharp) => solve_and_drive(step, sharp, folder, library)?,
@@ -90,7 +90,7 @@ fn blank(job: &Job, problem: usize) -> ResultLine {
     ResultLine {
         schema: "sharp.result/1".to_owned(),
         version: spec.version.clone(),
-        method: word(spec.method),
+        system: word(spec.system),
         learning: of_sharp(|sharp| word(sharp.learning)),
         env: spec.env.clone(),
         problem,
@@ -126,7 +126,7 @@ fn blank(job: &Job, problem: usize) -> ResultLine {
 const SIMULATOR: &str = "rapier2d";
 
 fn solve_and_drive(
-    step: &Step<'_>,
+    step: &JobStep<'_>,
     sharp: &SharpSpec,
     folder: &Path,
     library: &Path,
@@ -234,15 +234,15 @@ fn with_run(line: ResultLine, run: &RunReport) -> ResultLine {
 }
 
 fn baseline_args(spec: &Spec, problem: usize) -> Baseline {
-    let (method, collisions) = match spec.method {
-        Contender::RrtContact => (Method::Rrt, Collisions::Contact),
-        Contender::Track => (Method::Track, Collisions::End),
-        Contender::Mppi => (Method::Mppi, Collisions::End),
-        Contender::Sac => (Method::Sac, Collisions::End),
-        Contender::Rrt | Contender::Sharp => (Method::Rrt, Collisions::End),
+    let (system, collisions) = match spec.system {
+        SystemName::RrtContact => (BaselineName::Rrt, Collisions::Contact),
+        SystemName::Track => (BaselineName::Track, Collisions::End),
+        SystemName::Mppi => (BaselineName::Mppi, Collisions::End),
+        SystemName::Sac => (BaselineName::Sac, Collisions::End),
+        SystemName::Rrt | SystemName::Sharp => (BaselineName::Rrt, Collisions::End),
     };
     Baseline {
-        method,
+        system,
         map: map_args(&spec.env),
         robot: spec.robot.clone(),
         start: None,
