@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use crate::process::{cargo, exit_code};
-use crate::tidy;
+use crate::{downstream, examples, packages, tidy};
 
 /// Runs the steps in order up to the first that fails, and says how long each took.
 ///
@@ -33,8 +33,16 @@ pub(crate) fn run() -> anyhow::Result<u8> {
 type Step = fn() -> anyhow::Result<u8>;
 
 /// Cheap steps first.
-const STEPS: [(&str, Step); 5] =
-    [("format", format), ("tidy", tidy::run), ("clippy", clippy), ("docs", docs), ("tests", tests)];
+const STEPS: [(&str, Step); 8] = [
+    ("format", format),
+    ("tidy", tidy::run),
+    ("packages", packages::run),
+    ("clippy", clippy),
+    ("docs", docs),
+    ("tests", tests),
+    ("examples", examples::run),
+    ("downstream", downstream::run),
+];
 
 fn format() -> anyhow::Result<u8> {
     exit_code(&mut cargo(&["fmt", "--all", "--check"]))

@@ -8,7 +8,10 @@
 mod baselines;
 mod bench;
 mod ci;
+mod downstream;
 mod eval;
+mod examples;
+mod packages;
 mod peers;
 mod peers_learning;
 mod peers_option;
@@ -27,7 +30,8 @@ use crate::tree::Tree;
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
-  ci                     everything that must pass: format, tidy, clippy, docs, tests
+  ci                     everything that must pass: format, tidy, packages, clippy, docs, tests,
+                         examples, and the projects in tests/downstream
   tidy                   house rules that no compiler checks
   stats                  a table of lines, functions and docs of each crate
   train-regions [ARGS]   sharp regions train ARGS, on the ndarray device by default

@@ -9,11 +9,17 @@ mod licences;
 mod methods;
 mod names;
 mod one_loop;
+mod packages;
 mod seams;
 mod sources;
 
 use std::fmt;
+use std::process::Stdio;
 
+use anyhow::Context;
+use serde_json::Value;
+
+use crate::process::cargo;
 use crate::tree::Tree;
 
 /// A broken rule and where.
@@ -44,7 +50,9 @@ impl fmt::Display for Finding {
 pub(crate) fn run() -> anyhow::Result<u8> {
     let tree = Tree::load()?;
     let mut problems = Vec::new();
-    problems.extend(layers::check(&layers::workspace()?));
+    let metadata = metadata()?;
+    problems.extend(layers::check(&layers::packages(&metadata)));
+    problems.extend(packages::check(&metadata, &tree));
     problems.extend(licences::check(&licences::dependencies()?));
     problems.extend(sources::check(&tree));
     problems.extend(docs::check(&tree));
@@ -60,6 +68,15 @@ pub(crate) fn run() -> anyhow::Result<u8> {
     }
     println!("tidy: {} files, {} problems", tree.files.len(), problems.len());
     Ok(u8::from(!problems.is_empty()))
+}
+
+/// The packages of the workspace as cargo sees them.
+fn metadata() -> anyhow::Result<Value> {
+    let output = cargo(&["metadata", "--no-deps", "--format-version", "1"])
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cannot start cargo metadata")?;
+    serde_json::from_slice(&output.stdout).context("cargo metadata is not readable")
 }
 
 /// The text between backticks in `line`, in order.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 
 /// Names of folders that are not part of the repository.
-const FOREIGN: [&str; 3] = [".git", "target", "out"];
+pub(crate) const FOREIGN: [&str; 3] = [".git", "target", "out"];
 
 /// The root of the workspace: the parent of this package's folder.
 pub(crate) fn root() -> PathBuf {

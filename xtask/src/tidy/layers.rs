@@ -2,11 +2,9 @@
 //!
 //! A new edge is a line here, and therefore reviewed. An edge that no manifest has any more must go.
 
-use anyhow::Context;
 use serde_json::Value;
 
 use super::Finding;
-use crate::process::cargo;
 
 /// A crate, its layer, and the crates of the workspace that its manifest names.
 #[derive(Clone, Copy, Debug)]
@@ -129,18 +127,9 @@ struct Dependency {
     is_dev: bool,
 }
 
-/// The packages of the workspace as cargo sees them.
-///
-/// # Errors
-/// Returns an error if cargo cannot read the manifests.
-pub(super) fn workspace() -> anyhow::Result<Vec<Package>> {
-    let output = cargo(&["metadata", "--no-deps", "--format-version", "1"])
-        .stderr(std::process::Stdio::inherit())
-        .output()
-        .context("cannot start cargo metadata")?;
-    let metadata: Value = serde_json::from_slice(&output.stdout).context("cargo metadata is not readable")?;
-    let packages = metadata["packages"].as_array().context("cargo metadata names no packages")?;
-    Ok(packages.iter().map(package).collect())
+/// The packages of cargo's `metadata`.
+pub(super) fn packages(metadata: &Value) -> Vec<Package> {
+    metadata["packages"].as_array().into_iter().flatten().map(package).collect()
 }
 
 fn package(value: &Value) -> Package {

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use sharp_maps::{LoadOptions, load};
 use sharp_options::{EndpointId, InterfaceOptions, OptionFamily, OptionSet, OptionSettings};
-use sharp_rbvd::{Rbvd, RbvdSettings, StateAbstraction, StateId};
+use sharp_rbvd::{Rbvd, RbvdSettings, StateId};
 use sharp_regions::GeometricDetector;
 use sharp_space::{Cell, DistanceField, Footprint, Point, RegionDetector};
 

@@ -34,7 +34,7 @@ impl Parking {
 
     /// Where the place is, as the robot sees it, metres.
     fn offset(&self) -> Vector {
-        self.vehicle.state().pose.to_local(self.place).coords
+        self.vehicle.state().pose.to_local(self.place)
     }
 
     fn look(&self, observation: &mut [f32]) {
