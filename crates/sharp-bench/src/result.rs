@@ -17,7 +17,8 @@ pub struct ResultLine {
     /// The version of the program that measured.
     pub version: String,
     /// sharp, rrt, rrt-contact, track, mppi or sac.
-    pub method: String,
+    #[serde(rename = "method")]
+    pub system: String,
     /// fast, paper or prior; none for the baselines.
     pub learning: String,
     /// The environment: the name of a map.
@@ -159,7 +160,7 @@ impl ResultLine {
     /// Returns true for SHARP, false for the systems to compare with.
     #[must_use]
     pub fn is_of_sharp(&self) -> bool {
-        self.method == "sharp"
+        self.system == "sharp"
     }
 
     /// Where the plan lies below the folder of the evaluation.
@@ -197,9 +198,9 @@ pub fn read_baselines(path: &Path) -> Result<Vec<ResultLine>, ResultError> {
 /// One result for the terminal.
 #[must_use]
 pub fn row_text(line: &ResultLine) -> String {
-    let ResultLine { env, problem, robot, method, successes, episodes, .. } = line;
+    let ResultLine { env, problem, robot, system, successes, episodes, .. } = line;
     if !line.is_of_sharp() {
-        return format!("{env} P{problem} {robot} {method}: {successes} of {episodes}");
+        return format!("{env} P{problem} {robot} {system}: {successes} of {episodes}");
     }
     format!(
         "{} P{} {} {}: {} of {} (predicted {:.3}), reused {} of {}, {:.1} s",
@@ -223,7 +224,7 @@ impl ResultLine {
         Self {
             schema: "sharp.result/1".into(),
             version: "0.1.0".into(),
-            method: "sharp".into(),
+            system: "sharp".into(),
             learning: "fast".into(),
             env: env.into(),
             problem,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-pub(crate) use suites::{ContenderName, Engine, Eval, Jobs, Submit, Suite, SuiteSelection};
+pub(crate) use suites::{Engine, Eval, Jobs, Submit, Suite, SuiteSelection, SystemName};
 
 /// Samples of one plan of the baseline `rrt`, unless asked otherwise.
 pub(crate) const RRT_SAMPLES: usize = 30_000;
@@ -29,11 +29,11 @@ pub(crate) struct Cli {
     #[arg(long, global = true, value_name = "N")]
     pub(crate) threads: Option<usize>,
     #[command(subcommand)]
-    pub(crate) command: CliCommand,
+    pub(crate) command: Subcommands,
 }
 
 #[derive(Debug, Subcommand)]
-pub(crate) enum CliCommand {
+pub(crate) enum Subcommands {
     /// Solve a path planning problem: regions, abstraction, search, learning, a policy on disk.
     Solve(Solve),
     /// Run a solved plan in a simulator and count how often it holds.
@@ -434,8 +434,8 @@ impl BaselineName {
 #[derive(Debug, Args)]
 pub(crate) struct Baseline {
     /// The system.
-    #[arg(value_enum)]
-    pub(crate) method: BaselineName,
+    #[arg(value_enum, value_name = "METHOD")]
+    pub(crate) system: BaselineName,
     #[command(flatten)]
     pub(crate) map: MapArgs,
     /// husky, limo or a robot file (.ron).

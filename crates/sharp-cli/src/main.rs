@@ -22,7 +22,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
 
-use crate::args::{Cli, CliCommand};
+use crate::args::{Cli, Subcommands};
 use crate::outcome::{Exit, Failure, say};
 
 fn main() -> ExitCode {
@@ -46,18 +46,18 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(anyhow::Error::from)?;
     }
     match &cli.command {
-        CliCommand::Solve(args) => commands::solve::run(args, cli.seed, cli.json),
-        CliCommand::Run(args) => commands::run::run(args, cli.seed, cli.json),
-        CliCommand::Serve(args) => commands::serve::run(args),
-        CliCommand::Abstract(args) => commands::abstraction::run(args, cli.json),
-        CliCommand::Regions(command) => commands::regions::run(command, cli.seed, cli.json),
-        CliCommand::Prior(command) => commands::prior::run(command, cli.seed, cli.json),
-        CliCommand::Map(command) => commands::map::run(command, cli.json),
-        CliCommand::Library(command) => commands::library::run(command, cli.json),
-        CliCommand::Baseline(args) => commands::baseline::run(args, cli.seed, cli.json),
-        CliCommand::Eval(args) => commands::eval::run(args, cli.seed, cli.json),
-        CliCommand::Jobs(command) => commands::jobs::run(command, cli.seed, cli.json),
-        CliCommand::Completions { shell } => {
+        Subcommands::Solve(args) => commands::solve::run(args, cli.seed, cli.json),
+        Subcommands::Run(args) => commands::run::run(args, cli.seed, cli.json),
+        Subcommands::Serve(args) => commands::serve::run(args),
+        Subcommands::Abstract(args) => commands::abstraction::run(args, cli.json),
+        Subcommands::Regions(command) => commands::regions::run(command, cli.seed, cli.json),
+        Subcommands::Prior(command) => commands::prior::run(command, cli.seed, cli.json),
+        Subcommands::Map(command) => commands::map::run(command, cli.json),
+        Subcommands::Library(command) => commands::library::run(command, cli.json),
+        Subcommands::Baseline(args) => commands::baseline::run(args, cli.seed, cli.json),
+        Subcommands::Eval(args) => commands::eval::run(args, cli.seed, cli.json),
+        Subcommands::Jobs(command) => commands::jobs::run(command, cli.seed, cli.json),
+        Subcommands::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "sharp", &mut std::io::stdout());
             Ok(Exit::Done)
         }

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use sharp_space::trig;
+
 use crate::color::Color;
 use crate::svg::{PathData, Svg, number};
 use crate::text::TextStyle;
@@ -39,7 +41,7 @@ impl Marker {
             .map(|i| {
                 let angle = TAU * (f64::from(i) / f64::from(count) + turn);
                 let inner = if self == Self::Star && i % 2 == 1 { 0.45 } else { 1.0 };
-                [radius * scale * inner * angle.cos(), radius * scale * inner * angle.sin()]
+                [radius * scale * inner * trig::cos(angle), radius * scale * inner * trig::sin(angle)]
             })
             .collect()
     }

@@ -8,7 +8,7 @@ use sharp_drive::{
 };
 use sharp_guide::GuidePath;
 use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
-use sharp_space::{OccupancyGrid, Pose, Seed};
+use sharp_space::{OccupancyGrid, Pose, Seed, trig};
 
 /// Pure pursuit without any thought of bends or walls.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ fn main() {
     // A quarter of a circle with a radius of 4 m.
     let pose = |i: u32| {
         let angle = f64::from(i) * 0.05;
-        Pose::new(1.0 + 4.0 * angle.sin(), 5.0 - 4.0 * angle.cos(), angle)
+        Pose::new(1.0 + 4.0 * trig::sin(angle), 5.0 - 4.0 * trig::cos(angle), angle)
     };
     let guide = GuidePath::new((0..=31).map(pose).collect(), 0.25).expect("short gaps");
     let start = RobotState::at_rest(guide.start());

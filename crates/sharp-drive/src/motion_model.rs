@@ -167,7 +167,7 @@ mod tests {
         let model = MotionModel::new(robot);
         let mut misses = vec![];
         for i in 0..200 {
-            let wave = |frequency: f64| (f64::from(i) * frequency).sin();
+            let wave = |frequency: f64| trig::sin(f64::from(i) * frequency);
             let slip = SlipParameters { speed_share: 0.8, yaw_share: 0.8, drift_radps: 0.2 * wave(0.3) };
             let waypoint = Command { reach_m: 0.5, bearing_rad: 0.3 * wave(0.7), speed_mps: 0.5 };
             let mut before = RobotState::rolling(Pose::new(1.0, 2.0, 3.0), 0.4);

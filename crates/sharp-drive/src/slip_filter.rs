@@ -143,6 +143,7 @@ impl FeedForward {
 #[cfg(test)]
 mod tests {
     use sharp_sim::RobotModel;
+    use sharp_space::trig;
 
     use super::*;
 
@@ -155,7 +156,7 @@ mod tests {
         let mut estimate = SlipEstimate::new(&noise);
         let mut state = RobotState::at_rest(Pose::new(0.0, 0.0, 0.0));
         for i in 0..60 {
-            let command = Command { bearing_rad: 0.5 * (f64::from(i) * 0.7).sin(), ..AHEAD };
+            let command = Command { bearing_rad: 0.5 * trig::sin(f64::from(i) * 0.7), ..AHEAD };
             let before = state;
             model.act(&mut state, command, truth, |_| true);
             estimate = estimate.after(&model, (&before, command), &state);

@@ -6,7 +6,7 @@ use sharp_guide::{Goal, GuidePath, GuidedOption, LegId, OptionSpace};
 use sharp_options::{AllowedRule, OptionId, OptionKind, OptionSet, OptionSettings};
 use sharp_rbvd::{Rbvd, RbvdSettings, StateId};
 use sharp_sim::RobotModel;
-use sharp_space::{Cell, DistanceField, OccupancyGrid, Point, Pose, Region, RegionId};
+use sharp_space::{Cell, DistanceField, OccupancyGrid, Point, Pose, Region, RegionId, trig};
 
 use crate::world::World;
 
@@ -35,8 +35,8 @@ pub(crate) fn hall() -> World {
 /// A straight guide from `from` to `to`.
 pub(crate) fn straight(from: (f64, f64), to: (f64, f64)) -> GuidePath {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let count = (dx.hypot(dy) / 0.2).ceil();
-    let pose = |i: f64| Pose::new(from.0 + dx * i / count, from.1 + dy * i / count, dy.atan2(dx));
+    let count = (trig::hypot(dx, dy) / 0.2).ceil();
+    let pose = |i: f64| Pose::new(from.0 + dx * i / count, from.1 + dy * i / count, trig::atan2(dy, dx));
     GuidePath::new((0..=count as usize).map(|i| pose(i as f64)).collect(), 0.25).expect("short gaps")
 }
 

@@ -212,6 +212,8 @@ impl GuidePath {
 
 #[cfg(test)]
 mod tests {
+    use sharp_space::trig;
+
     use super::*;
 
     /// A hairpin: 3 m out along y = 0, around, and back along y = 0.4.
@@ -260,7 +262,7 @@ mod tests {
         let mut arc_m = 0.0;
         for i in 0..=600 {
             let pose = guide.pose_at(guide.length_m() * f64::from(i) / 600.0);
-            let swerve = 0.1 * (f64::from(i) * 0.3).sin();
+            let swerve = 0.1 * trig::sin(f64::from(i) * 0.3);
             let projection = guide.project(pose.to_world(sharp_space::Vector::new(0.0, swerve)), arc_m);
             assert!(
                 projection.arc_m > arc_m - 0.06,

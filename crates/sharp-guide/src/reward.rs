@@ -163,6 +163,8 @@ impl Reward for ProgressReward {
 
 #[cfg(test)]
 mod tests {
+    use sharp_space::trig;
+
     use super::*;
 
     fn straight() -> GuidePath {
@@ -175,7 +177,7 @@ mod tests {
         assert_eq!(reward.value(&guide, &pose, Place::Termination), 1000.0, "r_t");
         assert_eq!(reward.value(&guide, &pose, Place::Astray), -100.0, "r_p");
         // n(x) is the point at x = 4: 3.0067 m away, then 6 m to the end.
-        let expected = -(0.2_f64.hypot(3.0) + 6.0);
+        let expected = -(trig::hypot(0.2, 3.0) + 6.0);
         assert!((reward.value(&guide, &pose, Place::Allowed) - expected).abs() < 1e-12, "on the way");
     }
 

@@ -1,6 +1,6 @@
 //! What a robot drives between two poses: up to three pieces of constant curvature.
 
-use sharp_space::{Heading, Pose, Vector};
+use sharp_space::{Heading, Pose, Vector, trig};
 
 /// Metres that a turn in place of one radian is worth when lengths are compared.
 ///
@@ -26,7 +26,7 @@ impl Primitive {
             Vector::new(travel, 0.0)
         } else {
             let radius = travel / turn;
-            Vector::new(radius * turn.sin(), radius * (1.0 - turn.cos()))
+            Vector::new(radius * trig::sin(turn), radius * (1.0 - trig::cos(turn)))
         };
         Pose::at(from.to_world(local), Heading::new(from.heading.radians() + turn))
     }

@@ -33,7 +33,7 @@ impl RegionDetector for Halves {
         let (frame, field) = (grid.frame(), DistanceField::new(grid));
         let column = |id: u32| frame.width * (1 + 2 * id as usize) / 4;
         let region = |id| Region::new(RegionId(id), vec![Cell::new(column(id), frame.height / 2)], &field);
-        Detection::new((0..2).filter_map(|id| region(id).ok()).collect(), "halves")
+        Detection::new((0..2).filter_map(region).collect(), "halves")
     }
 }
 

@@ -212,7 +212,7 @@ impl Controller for ComposedPolicy {
 #[cfg(test)]
 mod tests {
     use sharp_options::OptionKind;
-    use sharp_space::Pose;
+    use sharp_space::{Pose, trig};
 
     use super::*;
     use crate::test_worlds::plan;
@@ -237,7 +237,8 @@ mod tests {
                 Decision::Drive(command) => {
                     let point = command.to_world(&state.pose);
                     let towards = point - state.pose.position;
-                    state = RobotState::at_rest(Pose::new(point.x, point.y, towards.y.atan2(towards.x)));
+                    state =
+                        RobotState::at_rest(Pose::new(point.x, point.y, trig::atan2(towards.y, towards.x)));
                     arrive(policy, state);
                 }
                 Decision::BackOff => panic!("nobody met a wall"),

@@ -344,7 +344,7 @@ mod tests {
         let query = Query { start: Pose::new(1.0, 1.4, 0.0), goal: Pose::new(9.8, 1.4, 0.0) };
         let names = |bypasses| {
             let settings = SearchSettings { bypasses, ..SearchSettings::default() };
-            super::tests::names(&plan(&world, query, settings, &unmeasured).expect("a way"))
+            names(&plan(&world, query, settings, &unmeasured).expect("a way"))
         };
         assert_eq!(names(true), "first:0 c:0-1-2 last:2");
         assert_eq!(

@@ -7,7 +7,7 @@ use sharp_guide::{GuidePath, GuidedOption};
 use sharp_options::{OptionKind, OptionSet, OptionSettings};
 use sharp_rbvd::{Rbvd, RbvdSettings};
 use sharp_sim::{NoiseModel, RobotModel};
-use sharp_space::{Cell, DistanceField, OccupancyGrid, Pose, Region, RegionId, Seed};
+use sharp_space::{Cell, DistanceField, OccupancyGrid, Pose, Region, RegionId, Seed, trig};
 
 use crate::abstraction::Abstraction;
 use crate::learn::LearntPolicy;
@@ -93,8 +93,8 @@ pub(crate) fn options(world: &World, abstraction: &Abstraction, query: Query) ->
 /// A straight guide from `from` to `to`.
 pub(crate) fn straight(from: (f64, f64), to: (f64, f64)) -> GuidePath {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let count = (dx.hypot(dy) / 0.2).ceil();
-    let pose = |i: f64| Pose::new(from.0 + dx * i / count, from.1 + dy * i / count, dy.atan2(dx));
+    let count = (trig::hypot(dx, dy) / 0.2).ceil();
+    let pose = |i: f64| Pose::new(from.0 + dx * i / count, from.1 + dy * i / count, trig::atan2(dy, dx));
     GuidePath::new((0..=count as usize).map(|i| pose(i as f64)).collect(), 0.25).expect("short gaps")
 }
 

@@ -1,6 +1,6 @@
 //! Regions as they lie in the configuration space, and regions for the parts that have none.
 
-use sharp_space::{DistanceField, Region, RegionId};
+use sharp_space::{DistanceField, Region, RegionId, trig};
 
 use crate::diagram::RbvdSettings;
 use crate::space::{FreeSpace, NONE};
@@ -82,7 +82,7 @@ impl CellAssignment<'_> {
         let in_disc = |index: usize| {
             let cell = frame.cell(index);
             let (dx, dy) = (cell.col.abs_diff(center.col) as f64, cell.row.abs_diff(center.row) as f64);
-            dx.hypot(dy) <= radius_cells
+            trig::hypot(dx, dy) <= radius_cells
         };
         let disc: Vec<usize> = part.iter().copied().filter(|&i| in_disc(i)).collect();
         self.settle(id, &disc, part);

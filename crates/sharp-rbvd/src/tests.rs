@@ -7,7 +7,7 @@ use arbtest::arbitrary::{Result as Arbitrary, Unstructured};
 use expect_test::{Expect, expect};
 use sharp_space::{
     Cell, CollisionChecker, DistanceField, Footprint, FootprintChecker, GridFrame, Heading, Occupancy,
-    OccupancyGrid, Point, Pose, Region, RegionId, Vector,
+    OccupancyGrid, Point, Pose, Region, RegionId, Vector, trig,
 };
 
 use crate::conformance::check_abstraction;
@@ -287,7 +287,7 @@ fn normals_point_across_the_border_whatever_the_grid() {
         let frame = GridFrame { origin, resolution_m, width: 80, height: 80 };
         let field = DistanceField::from_mask(frame, |_| false);
         let region = |id, side: f64| {
-            let (sin, cos) = f64::sin_cos(angle);
+            let (sin, cos) = trig::sin_cos(angle);
             let at = |v: f64| (40.0 + side * 20.0 * v) as usize;
             Region::new(RegionId(id), vec![Cell::new(at(cos), at(sin))], &field).unwrap()
         };

@@ -5,7 +5,7 @@
 //! narrowing of the free space is evidence too: where the medial axis passes one, a lower threshold
 //! is enough.
 
-use sharp_space::{Cell, DistanceField, Footprint, Region, RegionId};
+use sharp_space::{Cell, DistanceField, Footprint, Region, RegionId, trig};
 
 use crate::extract::{extract_regions, number};
 use crate::geometric::{disc_around, doorways};
@@ -58,7 +58,7 @@ fn around(center: Cell, clearance: &DistanceField, radius_m: f64) -> Vec<Cell> {
     let square = span(center.row, frame.height)
         .flat_map(|row| span(center.col, frame.width).map(move |col| Cell::new(col, row)));
     let is_near = |cell: &Cell| {
-        (cell.col as f64 - center.col as f64).hypot(cell.row as f64 - center.row as f64) <= reach as f64
+        trig::hypot(cell.col as f64 - center.col as f64, cell.row as f64 - center.row as f64) <= reach as f64
     };
     square.filter(is_near).collect()
 }

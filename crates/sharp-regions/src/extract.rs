@@ -5,7 +5,7 @@
 //! is too long until the piece splits; a piece that no threshold splits is covered by discs.
 
 use serde::{Deserialize, Serialize};
-use sharp_space::{Cell, DistanceField, GridFrame, Region, RegionId};
+use sharp_space::{Cell, DistanceField, GridFrame, Region, RegionId, trig};
 
 use crate::geometric::disc_around;
 use crate::heatmap::Heatmap;
@@ -130,8 +130,9 @@ impl Split<'_> {
         let mut centers: Vec<Cell> = Vec::new();
         let spacing = self.settings.disc_spacing_m / frame.resolution_m;
         for cell in order {
-            let apart =
-                |c: &Cell| (c.col as f64 - cell.col as f64).hypot(c.row as f64 - cell.row as f64) >= spacing;
+            let apart = |c: &Cell| {
+                trig::hypot(c.col as f64 - cell.col as f64, c.row as f64 - cell.row as f64) >= spacing
+            };
             if centers.iter().all(apart) {
                 centers.push(cell);
                 let radius = self.settings.disc_radius_m;

@@ -6,7 +6,7 @@
 //! (many solutions, small volume) without solving any problem.
 
 use serde::{Deserialize, Serialize};
-use sharp_space::{Cell, DistanceField, Footprint, Region, RegionId};
+use sharp_space::{Cell, DistanceField, Footprint, Region, RegionId, trig};
 
 use crate::skeleton::{Ridge, Skeleton};
 
@@ -184,7 +184,7 @@ impl Buckets {
         let (x, y) = (square(cell.col), square(cell.row));
         let close = |other: &Cell| {
             let (dc, dr) = (other.col as f64 - cell.col as f64, other.row as f64 - cell.row as f64);
-            dc.hypot(dr) < self.spacing_cells
+            trig::hypot(dc, dr) < self.spacing_cells
         };
         let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (x + dx, y + dy)));
         if !around.filter_map(|key| self.squares.get(&key)).flatten().any(close) {
@@ -210,7 +210,7 @@ pub(crate) fn disc_around(
     let reach = radius_m / frame.resolution_m;
     let belongs = |cell: Cell| {
         let (dc, dr) = (cell.col as f64 - center.col as f64, cell.row as f64 - center.row as f64);
-        dc.hypot(dr) <= reach && clearance.at(cell) >= min_clearance_m
+        trig::hypot(dc, dr) <= reach && clearance.at(cell) >= min_clearance_m
     };
     if taken[frame.index(center)] || !belongs(center) {
         return Vec::new();

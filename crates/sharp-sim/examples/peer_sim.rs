@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use sharp_sim::{AnySim, ObstacleMap, RobotModel, RobotState, Simulator, SimulatorKind, WheelCommand};
-use sharp_space::{OccupancyGrid, Point, Pose};
+use sharp_space::{OccupancyGrid, Point, Pose, trig};
 
 #[path = "../benches/support/maps.rs"]
 mod maps;
@@ -125,9 +125,9 @@ impl Circuit {
             self.hops += 1;
             self.left_m = HOP_M;
         }
-        let bearing = target.y.atan2(target.x);
+        let bearing = trig::atan2(target.y, target.x);
         let command = WheelCommand::Twist {
-            speed_mps: (2.0 * target.norm()).min(1.0) * bearing.cos().max(0.0),
+            speed_mps: (2.0 * target.norm()).min(1.0) * trig::cos(bearing).max(0.0),
             yaw_rate_radps: (3.0 * bearing).clamp(-1.5, 1.5),
         };
         let info = self.sim.step(command, DT_S);

@@ -4,7 +4,7 @@
 //! name. The reference point is the centre of the footprint, which is also the middle between the axles.
 
 use serde::{Deserialize, Serialize};
-use sharp_space::{Footprint, FootprintError};
+use sharp_space::{Footprint, FootprintError, trig};
 use thiserror::Error;
 
 use crate::description::{self, SyntaxError};
@@ -136,7 +136,7 @@ impl RobotModel {
     pub fn min_turning_radius_m(&self) -> f64 {
         match self.drive {
             Drive::Differential { .. } => 0.0,
-            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => wheelbase_m / max_steer_rad.tan(),
+            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => wheelbase_m / trig::tan(max_steer_rad),
         }
     }
 

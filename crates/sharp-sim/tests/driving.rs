@@ -9,7 +9,7 @@ use sharp_sim::{
     ActionSettings, AnySim, KinematicSim, NoiseModel, ObstacleMap, PlanarSim, RobotModel, RobotState,
     Simulator, SimulatorKind, Vehicle, WheelCommand,
 };
-use sharp_space::{GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Seed, Vector};
+use sharp_space::{GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Seed, Vector, trig};
 
 const DT_S: f64 = 1.0 / 60.0;
 const KINDS: [SimulatorKind; 2] = [SimulatorKind::Kinematic, SimulatorKind::Planar];
@@ -402,7 +402,7 @@ fn episode(vehicle: &mut Vehicle<AnySim>, actions: u64) -> Vec<RobotState> {
     (0..actions)
         .map(|i| {
             let bearing = i as f64 * 2.4;
-            let offset = Vector::new(bearing.cos(), bearing.sin()) * 0.5 + Vector::new(0.4, 0.0);
+            let offset = Vector::new(trig::cos(bearing), trig::sin(bearing)) * 0.5 + Vector::new(0.4, 0.0);
             let waypoint = vehicle.state().pose.position + offset;
             vehicle.act(waypoint).after
         })

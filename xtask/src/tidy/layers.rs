@@ -102,7 +102,6 @@ const LIBRARIES: &[&str] = &[
     "sharp-plan",
     "sharp-bench",
     "sharp-draw",
-    "sharp-bench",
 ];
 
 /// Families of heavy packages, by the beginning of their names, and the crates that may name them.

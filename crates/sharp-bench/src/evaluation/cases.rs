@@ -36,7 +36,7 @@ pub(super) fn problem(line: &ResultLine) -> ProblemKey<'_> {
 
 /// The kind of option of SHARP, or the name of a baseline.
 pub(super) fn method(line: &ResultLine) -> &str {
-    if line.is_of_sharp() { &line.options } else { &line.method }
+    if line.is_of_sharp() { &line.options } else { &line.system }
 }
 
 /// Wall time until a policy or a path is ready, seconds.
@@ -245,7 +245,7 @@ mod tests {
     fn baselines_are_compared_on_the_same_problems_under_the_same_noise() {
         let line = ResultLine::example("a", "limo", "interface", 1);
         let rival = |env: &str, noise: &str| ResultLine {
-            method: "rrt".into(),
+            system: "rrt".into(),
             noise: noise.into(),
             ..ResultLine::example(env, "limo", "none", 1)
         };

@@ -100,7 +100,7 @@ fn distinct(items: impl Iterator<Item = String>) -> Vec<String> {
 /// The name of a baseline, or SHARP with all that is not as usual.
 fn label(line: &ResultLine) -> String {
     if !line.is_of_sharp() {
-        return line.method.clone();
+        return line.system.clone();
     }
     let usual = default_regions();
     let unusual = [(&line.learning, "fast"), (&line.regions, &usual), (&line.variant, "default")];
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn problems_add_up_under_each_noise() {
         let track = |problem, successes| ResultLine {
-            method: "track".into(),
+            system: "track".into(),
             noise: "harsh".into(),
             successes,
             collisions: 20 - successes,

@@ -76,7 +76,7 @@ mod tests {
     fn what_is_there_is_not_missing() {
         let line = ResultLine::example("a", "limo", "centroid", 1);
         let lines = [
-            ResultLine { method: "rrt".into(), ..line.clone() },
+            ResultLine { system: "rrt".into(), ..line.clone() },
             ResultLine { trial: 4, ..line.clone() },
             ResultLine { noise: "none".into(), ..line.clone() },
             ResultLine { regions: "grid".into(), ..line.clone() },

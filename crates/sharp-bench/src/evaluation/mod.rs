@@ -143,7 +143,7 @@ mod tests {
             ResultLine { noise: "nominal*2".into(), ..line.clone() },
             ResultLine { regions: "grid".into(), ..line.clone() },
             ResultLine { env: "d".into(), ..line.clone() },
-            ResultLine { method: "track".into(), status: "driven".into(), ..line.clone() },
+            ResultLine { system: "track".into(), status: "driven".into(), ..line.clone() },
             line,
         ]);
         lines

@@ -235,8 +235,8 @@ mod tests {
     fn a_planner_is_a_method_in_one_setting() {
         let line = ResultLine::example("a", "limo", "centroid", 1);
         let grid = ResultLine { regions: "grid".into(), noise: "nominal*2".into(), ..line.clone() };
-        let rrt = ResultLine { method: "rrt".into(), status: "driven".into(), successes: 0, ..line.clone() };
-        let walk = ResultLine { method: "walk; run".into(), ..rrt.clone() };
+        let rrt = ResultLine { system: "rrt".into(), status: "driven".into(), successes: 0, ..line.clone() };
+        let walk = ResultLine { system: "walk; run".into(), ..rrt.clone() };
         let planners = read(&log(&[&line, &line, &grid, &rrt, &walk]));
         let names: Vec<(&str, usize)> =
             planners.iter().map(|(name, runs)| (name.as_str(), runs.len())).collect();

@@ -85,7 +85,7 @@ fn what_was_run(results: &Results<'_>) -> String {
         let _ = write!(text, "; {}", variant.replace('_', " "));
     }
     if !baselines.is_empty() {
-        let _ = write!(text, "; baselines {}", listed(baselines.iter().map(|line| &line.method)));
+        let _ = write!(text, "; baselines {}", listed(baselines.iter().map(|line| &line.system)));
     }
     text + "."
 }

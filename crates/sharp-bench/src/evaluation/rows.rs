@@ -175,7 +175,7 @@ mod tests {
     fn baseline(successes: u32) -> ResultLine {
         let line = ResultLine::example("a", "limo", "none", 1);
         let mean_sim_time_s = if successes == 0 { 0.0 } else { 12.5 };
-        ResultLine { method: "rrt".into(), successes, mean_sim_time_s, ..line }
+        ResultLine { system: "rrt".into(), successes, mean_sim_time_s, ..line }
     }
 
     #[test]

@@ -68,7 +68,7 @@ pub(crate) struct SuiteSelection {
     pub(crate) problems: Vec<usize>,
     /// These methods instead of the suite's, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',')]
-    pub(crate) methods: Vec<ContenderName>,
+    pub(crate) methods: Vec<SystemName>,
     /// Independent repetitions [default: 1; 5 in `paper`].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) trials: Option<u32>,
@@ -97,7 +97,7 @@ pub(crate) enum Suite {
 /// What a suite measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum ContenderName {
+pub(crate) enum SystemName {
     /// This project.
     Sharp,
     /// RRT with replanning; a contact is a failure.

@@ -84,7 +84,7 @@ struct Measured {
 }
 
 pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let bar = spinner(args.method.name());
+    let bar = spinner(args.system.name());
     let report = measure(args, seed)?;
     bar.finish_and_clear();
     if json {
@@ -147,7 +147,7 @@ impl Bench<'_> {
         let Self { args, world, query, seed, .. } = self;
         stopwatch.enter("plan");
         let planner = RoutePlanner::new(world, query.goal);
-        if args.method == BaselineName::Rrt {
+        if args.system == BaselineName::Rrt {
             let budget = Budget { iterations: args.rrt_samples };
             let settings = RrtSettings { budget, ..RrtSettings::default() };
             let rrt = Rrt {
@@ -162,13 +162,13 @@ impl Bench<'_> {
         }
         let route = planner.plan_from(query.start);
         stopwatch.stop();
-        if args.method == BaselineName::Sac {
+        if args.system == BaselineName::Sac {
             let length_s = route.map(|route| 6.0 * route.length_m() / world.robot.max_speed_mps);
             return self.learn(length_s.unwrap_or(HORIZON_S).max(60.0), stopwatch, stop).map(Some);
         }
         let Some(route) = route else { return Ok(None) };
         let (robot, noise) = (&world.robot, self.settings.noise.clone());
-        Ok(Some(if args.method == BaselineName::Track {
+        Ok(Some(if args.system == BaselineName::Track {
             self.drive(
                 &Track {
                     world,
@@ -248,7 +248,7 @@ impl Bench<'_> {
             driven.iter().map(|one| one.record.planning_us).sum::<f64>() / driven.len().max(1) as f64;
         BaselineReport {
             schema: "sharp.baseline/1",
-            method: self.args.method.name(),
+            method: self.args.system.name(),
             status: if measured.is_some() { "driven" } else { "no_plan" },
             robot: self.world.robot.name.clone(),
             noise: self.args.noise.clone(),

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sharp_drive::{Command, Controller, Decision, Motion};
 use sharp_plan::{ComposedPolicy, Plan};
 use sharp_sim::{ActionSettings, RobotState};
-use sharp_space::{Pose, Vector};
+use sharp_space::{Pose, Vector, trig};
 
 use crate::args::Serve;
 use crate::commands::run::load_plan;
@@ -117,7 +117,7 @@ impl Served {
         let waypoint = command.map(|command| {
             let point = command.to_world(&state.pose);
             let towards = point - state.pose.position;
-            [point.x, point.y, towards.y.atan2(towards.x)]
+            [point.x, point.y, trig::atan2(towards.y, towards.x)]
         });
         let speed = command.map_or(0.0, |command| command.speed_mps);
         to_json(&Reply { waypoint, speed, option: &option, status })

@@ -58,13 +58,13 @@ fn guarded(job: &Job, run: impl FnOnce() -> Result<Ended, Failure>) -> Result<En
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::args::ContenderName;
+    use crate::args::SystemName;
     use crate::jobs::Manifest;
     use crate::jobs::spec::Spec;
 
     fn tracking(trial: u32) -> Spec {
         let spec =
-            Spec { trial, episodes: 1, problems: vec![2], method: ContenderName::Track, ..Spec::example() };
+            Spec { trial, episodes: 1, problems: vec![2], system: SystemName::Track, ..Spec::example() };
         Spec { sharp: None, ..spec }
     }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sharp_bench::{Variant, default_regions};
 use sharp_plan::{hash, map_hash};
 
-use crate::args::{ContenderName, Kind, Learning, MapArgs, Switch, Unknown};
+use crate::args::{Kind, Learning, MapArgs, Switch, SystemName, Unknown};
 use crate::input;
 use crate::outcome::{Failure, to_json};
 
@@ -18,7 +18,8 @@ pub(crate) struct Spec {
     pub(crate) version: String,
     pub(crate) env: String,
     pub(crate) robot: String,
-    pub(crate) method: ContenderName,
+    #[serde(rename = "method")]
+    pub(crate) system: SystemName,
     /// How SHARP is set; `None` for a baseline.
     pub(crate) sharp: Option<SharpSpec>,
     /// A name or a file.
@@ -99,7 +100,7 @@ impl Spec {
                     words.push(self.variant());
                 }
             }
-            None => words.push(word(self.method)),
+            None => words.push(word(self.system)),
         }
         words.extend([self.noise.clone(), format!("t{}", self.trial), self.key()[..8].to_owned()]);
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
@@ -148,12 +149,12 @@ impl Spec {
     pub(crate) fn weight_s(&self) -> f64 {
         let is_large = ["e", "f", "g"].contains(&self.env.as_str());
         // Measured on one core: docs/scale.md.
-        let [small_s, large_s] = match (self.method, self.sharp.as_ref().map(|sharp| sharp.learning)) {
-            (ContenderName::Sharp, Some(Learning::Paper)) | (ContenderName::Sac, _) => [self.time_limit_s; 2],
-            (ContenderName::Sharp, _) => [4.0, 17.0],
-            (ContenderName::Rrt | ContenderName::RrtContact, _) => [0.7, 15.0],
-            (ContenderName::Track, _) => [0.1, 0.5],
-            (ContenderName::Mppi, _) => [1.0, 4.0],
+        let [small_s, large_s] = match (self.system, self.sharp.as_ref().map(|sharp| sharp.learning)) {
+            (SystemName::Sharp, Some(Learning::Paper)) | (SystemName::Sac, _) => [self.time_limit_s; 2],
+            (SystemName::Sharp, _) => [4.0, 17.0],
+            (SystemName::Rrt | SystemName::RrtContact, _) => [0.7, 15.0],
+            (SystemName::Track, _) => [0.1, 0.5],
+            (SystemName::Mppi, _) => [1.0, 4.0],
         };
         let each_s: f64 = if is_large { large_s } else { small_s };
         each_s.min(self.time_limit_s) * self.problems.len() as f64
@@ -191,7 +192,7 @@ impl Spec {
             version: version().into(),
             env: "a".into(),
             robot: "husky".into(),
-            method: ContenderName::Sharp,
+            system: SystemName::Sharp,
             sharp: Some(sharp),
             noise: "nominal".into(),
             trial: 0,

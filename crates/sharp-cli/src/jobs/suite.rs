@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use sharp_space::Seed;
 
 use super::spec::{Inputs, SharpSpec, Spec, version};
-use crate::args::{ContenderName, Kind, Learning, Suite, SuiteSelection};
+use crate::args::{Kind, Learning, Suite, SuiteSelection, SystemName};
 use crate::outcome::Failure;
 
 /// The jobs that `selection` asks for, in the order of their results; `seed` is the root of trial 0.
@@ -19,7 +19,7 @@ pub(crate) fn specs(selection: &SuiteSelection, seed: u64) -> Result<Vec<Spec>, 
         for robot in chosen("--robots", &selection.robots, robots(selection.suite))? {
             for noise in &selection.noise {
                 let inputs = Inputs::read(&env, &robot, noise, Some(&selection.regions))?;
-                let world = JobGroup { env: &env, robot: &robot, noise, problems: &problems, inputs };
+                let world = SuiteWorld { env: &env, robot: &robot, noise, problems: &problems, inputs };
                 specs.extend(world.specs(selection, seed));
             }
         }
@@ -28,7 +28,7 @@ pub(crate) fn specs(selection: &SuiteSelection, seed: u64) -> Result<Vec<Spec>, 
 }
 
 /// Where all methods are measured beside each other.
-struct JobGroup<'a> {
+struct SuiteWorld<'a> {
     env: &'a str,
     robot: &'a str,
     noise: &'a str,
@@ -36,13 +36,13 @@ struct JobGroup<'a> {
     inputs: Inputs,
 }
 
-impl JobGroup<'_> {
+impl SuiteWorld<'_> {
     /// All methods in each trial.
     fn specs(&self, selection: &SuiteSelection, seed: u64) -> Vec<Spec> {
         let trials = selection.trials.unwrap_or(if selection.suite == Suite::Paper { 5 } else { 1 });
-        let methods = contenders(selection);
-        let all = (0..trials).flat_map(|trial| methods.iter().map(move |method| (trial, method)));
-        all.map(|(trial, (method, sharp))| self.spec(selection, (trial, seed), *method, sharp.clone()))
+        let systems = contenders(selection);
+        let all = (0..trials).flat_map(|trial| systems.iter().map(move |system| (trial, system)));
+        all.map(|(trial, (system, sharp))| self.spec(selection, (trial, seed), *system, sharp.clone()))
             .collect()
     }
 
@@ -50,7 +50,7 @@ impl JobGroup<'_> {
         &self,
         selection: &SuiteSelection,
         (trial, seed): (u32, u64),
-        method: ContenderName,
+        system: SystemName,
         sharp: Option<SharpSpec>,
     ) -> Spec {
         let regions = self.inputs.regions.clone().filter(|_| sharp.is_some());
@@ -58,7 +58,7 @@ impl JobGroup<'_> {
             version: version().to_owned(),
             env: self.env.to_owned(),
             robot: self.robot.to_owned(),
-            method,
+            system,
             sharp,
             noise: self.noise.to_owned(),
             trial,
@@ -156,26 +156,26 @@ fn problems(env: &str, selection: &SuiteSelection) -> Result<Vec<usize>, Failure
 }
 
 /// The methods on one environment: SHARP in all its settings, then the baselines.
-fn contenders(selection: &SuiteSelection) -> Vec<(ContenderName, Option<SharpSpec>)> {
+fn contenders(selection: &SuiteSelection) -> Vec<(SystemName, Option<SharpSpec>)> {
     let methods = match selection.suite {
         _ if !selection.methods.is_empty() => &selection.methods[..],
         Suite::Smoke | Suite::Quick => {
-            &[ContenderName::Sharp, ContenderName::Rrt, ContenderName::Track, ContenderName::Mppi]
+            &[SystemName::Sharp, SystemName::Rrt, SystemName::Track, SystemName::Mppi]
         }
         Suite::Paper => &[
-            ContenderName::Sharp,
-            ContenderName::Rrt,
-            ContenderName::RrtContact,
-            ContenderName::Track,
-            ContenderName::Mppi,
-            ContenderName::Sac,
+            SystemName::Sharp,
+            SystemName::Rrt,
+            SystemName::RrtContact,
+            SystemName::Track,
+            SystemName::Mppi,
+            SystemName::Sac,
         ],
     };
-    let settings = |&method: &ContenderName| match method {
-        ContenderName::Sharp => {
-            sharp_settings(selection).into_iter().map(|sharp| (method, Some(sharp))).collect()
+    let settings = |&system: &SystemName| match system {
+        SystemName::Sharp => {
+            sharp_settings(selection).into_iter().map(|sharp| (system, Some(sharp))).collect()
         }
-        _ => vec![(method, None)],
+        _ => vec![(system, None)],
     };
     methods.iter().flat_map(settings).collect()
 }
@@ -202,11 +202,11 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::args::{Cli, CliCommand};
+    use crate::args::{Cli, Subcommands};
 
     fn specs_of(flags: &str) -> Result<Vec<Spec>, Failure> {
         let cli = Cli::parse_from(format!("sharp eval {flags}").split_whitespace());
-        let CliCommand::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
+        let Subcommands::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
         specs(&args.selection, cli.seed)
     }
 
@@ -216,7 +216,7 @@ mod tests {
                     --cost-update on --time-limit 60 --learning fast,paper --envs a,b --options interface \
                     --problems 1,3 --methods sharp,rrt-contact --trials 2";
         let cli = Cli::parse_from(text.split_whitespace());
-        let CliCommand::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
+        let Subcommands::Eval(args) = &cli.command else { panic!("{:?} is no evaluation", cli.command) };
         assert_eq!(command("eval", &args.selection, cli.seed), text);
     }
 

@@ -15,8 +15,8 @@ use super::manifest::Job;
 use super::spec::{SharpSpec, Spec, map_args, word};
 use super::step::JobStep;
 use crate::args::{
-    AbstractionArgs, Baseline, BaselineName, Collisions, ContenderName, Guide, MAX_ENV_STEPS, Metric,
-    RRT_SAMPLES, Solve, Switch,
+    AbstractionArgs, Baseline, BaselineName, Collisions, Guide, MAX_ENV_STEPS, Metric, RRT_SAMPLES, Solve,
+    Switch, SystemName,
 };
 use crate::commands::baseline::{BaselineReport, measure};
 use crate::commands::solve::{Solved, solve_problem};
@@ -90,7 +90,7 @@ fn blank(job: &Job, problem: usize) -> ResultLine {
     ResultLine {
         schema: "sharp.result/1".to_owned(),
         version: spec.version.clone(),
-        method: word(spec.method),
+        system: word(spec.system),
         learning: of_sharp(|sharp| word(sharp.learning)),
         env: spec.env.clone(),
         problem,
@@ -234,15 +234,15 @@ fn with_run(line: ResultLine, run: &RunReport) -> ResultLine {
 }
 
 fn baseline_args(spec: &Spec, problem: usize) -> Baseline {
-    let (method, collisions) = match spec.method {
-        ContenderName::RrtContact => (BaselineName::Rrt, Collisions::Contact),
-        ContenderName::Track => (BaselineName::Track, Collisions::End),
-        ContenderName::Mppi => (BaselineName::Mppi, Collisions::End),
-        ContenderName::Sac => (BaselineName::Sac, Collisions::End),
-        ContenderName::Rrt | ContenderName::Sharp => (BaselineName::Rrt, Collisions::End),
+    let (system, collisions) = match spec.system {
+        SystemName::RrtContact => (BaselineName::Rrt, Collisions::Contact),
+        SystemName::Track => (BaselineName::Track, Collisions::End),
+        SystemName::Mppi => (BaselineName::Mppi, Collisions::End),
+        SystemName::Sac => (BaselineName::Sac, Collisions::End),
+        SystemName::Rrt | SystemName::Sharp => (BaselineName::Rrt, Collisions::End),
     };
     Baseline {
-        method,
+        system,
         map: map_args(&spec.env),
         robot: spec.robot.clone(),
         start: None,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use sharp_space::Cell;
+use sharp_space::{Cell, trig};
 
 use super::{INK, Scene};
 use crate::svg::Svg;
@@ -35,7 +35,7 @@ impl LabelBox {
     /// Returns true if the disc around `center` reaches into the box.
     fn touches(&self, center: [f64; 2], radius: f64) -> bool {
         let gap = |axis: usize| ((self.middle[axis] - center[axis]).abs() - self.half[axis]).max(0.0);
-        gap(0).hypot(gap(1)) < radius
+        trig::hypot(gap(0), gap(1)) < radius
     }
 
     fn corners_and_middle(&self) -> [[f64; 2]; 5] {
@@ -93,7 +93,7 @@ fn around() -> impl Iterator<Item = [f64; 2]> {
         let count = if radius == 0.0 { 1 } else { DIRECTIONS };
         (0..count).map(move |i| {
             let angle = TAU * i as f64 / DIRECTIONS as f64;
-            [radius * angle.cos(), radius * angle.sin()]
+            [radius * trig::cos(angle), radius * trig::sin(angle)]
         })
     })
 }

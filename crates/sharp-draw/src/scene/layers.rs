@@ -1,6 +1,6 @@
 //! The layers of the map's window, bottom to top, in cells.
 
-use sharp_space::{Cell, GridFrame, Heading, Occupancy, Point, Pose, Vector};
+use sharp_space::{Cell, GridFrame, Heading, Occupancy, Point, Pose, Vector, trig};
 
 use super::heat::HeatBlocks;
 use super::{
@@ -266,7 +266,7 @@ pub(super) fn star([x, y]: [f64; 2], radius: f64) -> PathData {
     let corners = (0..10).map(|i| {
         let radius = radius * if i % 2 == 0 { 1.0 } else { 0.42 };
         let angle = std::f64::consts::PI * f64::from(i) / 5.0;
-        [x + radius * angle.sin(), y - radius * angle.cos()]
+        [x + radius * trig::sin(angle), y - radius * trig::cos(angle)]
     });
     PathData::polyline(corners).close()
 }

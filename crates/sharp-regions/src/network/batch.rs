@@ -100,6 +100,8 @@ fn source_bin(mut bin: usize, symmetry: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use sharp_space::trig;
+
     use super::*;
     use crate::labels::fine_bin;
 
@@ -109,13 +111,17 @@ mod tests {
             for bin in 0..FINE_BINS {
                 let angle =
                     (bin as f64 + 0.5) / FINE_BINS as f64 * std::f64::consts::TAU - std::f64::consts::PI;
-                let (mut y, mut x) = angle.sin_cos();
+                let (mut y, mut x) = trig::sin_cos(angle);
                 x *= if symmetry & 1 != 0 { -1.0 } else { 1.0 };
                 y *= if symmetry & 2 != 0 { -1.0 } else { 1.0 };
                 if symmetry & 4 != 0 {
                     std::mem::swap(&mut x, &mut y);
                 }
-                assert_eq!(source_bin(bin, symmetry), fine_bin(y.atan2(x)), "bin {bin}, symmetry {symmetry}");
+                assert_eq!(
+                    source_bin(bin, symmetry),
+                    fine_bin(trig::atan2(y, x)),
+                    "bin {bin}, symmetry {symmetry}"
+                );
             }
         }
     }

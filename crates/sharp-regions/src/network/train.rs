@@ -12,6 +12,7 @@ use burn::module::Module;
 use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer, OptimizerRecord};
 use burn::tensor::{Bytes, Device};
 use sharp_maps::FloorplanKind;
+use sharp_space::trig;
 use thiserror::Error;
 
 use crate::labels::LabelRobot;
@@ -308,7 +309,7 @@ fn learning_rate(settings: &RegionTrainSettings, step: usize) -> f64 {
     const RAMP_STEPS: f64 = 20.0;
     let ramp = ((step + 1) as f64 / RAMP_STEPS).min(1.0);
     let share = step as f64 / settings.steps as f64;
-    settings.learning_rate * ramp * 0.5 * (1.0 + (std::f64::consts::PI * share).cos())
+    settings.learning_rate * ramp * 0.5 * (1.0 + trig::cos(std::f64::consts::PI * share))
 }
 
 #[cfg(test)]
