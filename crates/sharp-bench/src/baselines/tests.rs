@@ -1,17 +1,23 @@
 //! Drawn problems for all baselines, and controllers that only a test would let drive.
 
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
 use rayon::ThreadPoolBuilder;
 use sharp_drive::{
     Command, Controller, Decision, EpisodeEnd, Motion, MppiSettings, ProfiledFollower, Readiness, Supervisor,
     World,
 };
 use sharp_motion::{Budget, RrtSettings};
-use sharp_plan::Query;
+use sharp_plan::{Answer, Conditions, Method, Query, Sharp};
 use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
-use sharp_space::{OccupancyGrid, Pose, Seed};
+use sharp_space::{
+    Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose, Region, RegionDetector, RegionId, Seed,
+};
 
 use super::*;
-use crate::contender::{ComparisonSettings, Contender, Driven, compare};
+use crate::conformance::check_contender;
+use crate::contender::{ComparisonSettings, Composed, Contender, Driven, compare};
 
 /// A hall of 10 by 4 m, 0.4 m a cell.
 const HALL: &str = "
@@ -72,12 +78,12 @@ fn rrt<'a>(planner: &'a RoutePlanner<'a>, world: &'a World, query: Query, contac
     Rrt { world, planner, query, settings, contact_ends, seed: Seed(2) }
 }
 
-/// Lets every method that plans drive `query` and hands what came of it to `check`.
-fn each_drives(
+/// Hands every contender that plans, prepared for `query`, to `check`.
+fn each(
     world: &World,
     query: Query,
     settings: &ComparisonSettings,
-    check: impl Fn(&str, Vec<Driven>),
+    mut check: impl FnMut(&str, &dyn Contender),
 ) {
     let planner = &RoutePlanner::new(world, query.goal);
     let route = planner.plan_from(query.start).expect("there is a way");
@@ -94,11 +100,62 @@ fn each_drives(
         seed: Seed(3),
     };
     let track = Track { world, planner, query, route, follower, noise };
-    let rrt = rrt(planner, world, query, settings.contact_ends);
-    let methods: [(&str, &dyn Contender); 3] = [("rrt", &rrt), ("track", &track), ("mppi", &mpc)];
-    for (name, method) in methods {
-        check(name, compare(method, world, &query, settings, &Supervisor::silent()));
+    check("rrt", &rrt(planner, world, query, settings.contact_ends));
+    check("track", &track);
+    check("mppi", &mpc);
+}
+
+/// Lets every contender that plans drive `query` and hands what came of it to `check`.
+fn each_drives(
+    world: &World,
+    query: Query,
+    settings: &ComparisonSettings,
+    check: impl Fn(&str, Vec<Driven>),
+) {
+    each(world, query, settings, |name, contender| {
+        check(name, compare(contender, world, &query, settings, &Supervisor::silent()));
+    });
+}
+
+#[test]
+fn our_contenders_conform() {
+    for robot in [RobotModel::husky(), RobotModel::limo()] {
+        let world = world(RING, robot);
+        let query = query((1.4, 4.6), (8.6, 1.4));
+        each(&world, query, &settings(&world, NoiseModel::nominal(), true), |name, contender| {
+            assert_eq!(check_contender(contender, &world, &query), Ok(()), "{name}");
+        });
     }
+}
+
+/// A region in either half of the hall.
+#[derive(Debug)]
+struct Halves;
+
+impl RegionDetector for Halves {
+    fn detect(&self, grid: &OccupancyGrid, _: &Footprint) -> Detection {
+        let field = DistanceField::new(grid);
+        let region = |(id, col)| Region::new(RegionId(id), vec![Cell::new(col, 5)], &field);
+        Detection::new([(0, 6), (1, 18)].into_iter().filter_map(region).collect(), "halves")
+    }
+}
+
+#[test]
+fn plans_and_flat_policies_conform() {
+    let world = world(HALL, RobotModel::husky());
+    let query = query((1.0, 2.2), (9.0, 2.2));
+    let method = Method::prior().with_episodes(50, 50, 50);
+    let answer = Sharp::new(world.clone(), Halves).with_method(method).solve(query, &());
+    let Ok(Answer::Solved(plan)) = answer else { panic!("no plan through a hall: {answer:?}") };
+    let composed = Composed { plan: Arc::new(*plan), recovery: true };
+    assert_eq!(check_contender(&composed, &world, &query), Ok(()), "a plan");
+
+    let conditions = Conditions::new(&world, NoiseModel::nominal());
+    let budget = SacBudget { max_env_steps: 200, horizon_s: 60.0 };
+    let flat =
+        FlatSac::learn(&world, query, (&conditions, Seed(1)), budget, &mut |_| ControlFlow::Continue(()));
+    let flat = flat.expect("a sound task");
+    assert_eq!(check_contender(&flat, &world, &query), Ok(()), "a policy that learnt next to nothing");
 }
 
 #[test]
