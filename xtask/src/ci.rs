@@ -45,7 +45,9 @@ const STEPS: [(&str, Step); 8] = [
 ];
 
 fn format() -> anyhow::Result<u8> {
-    exit_code(&mut cargo(&["fmt", "--all", "--check"]))
+    let code = exit_code(&mut cargo(&["fmt", "--all", "--check"]))?;
+    let downstream = exit_code(cargo(&["fmt", "--check"]).current_dir(downstream::folder()))?;
+    Ok(code.max(downstream))
 }
 
 fn clippy() -> anyhow::Result<u8> {

@@ -1,5 +1,6 @@
 //! The projects in `tests/downstream`: single crates used as a stranger would.
 
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
@@ -11,12 +12,17 @@ use crate::tree;
 const ABSENT: [(&str, &[&str]); 3] =
     [("geojson", &["burn", "rapier", "parry"]), ("own_environment", &["burn"]), ("own_planner", &["burn"])];
 
+/// The workspace of the projects.
+pub(crate) fn folder() -> PathBuf {
+    tree::root().join("tests/downstream")
+}
+
 /// Builds the projects, runs them, and checks what they depend on.
 ///
 /// # Errors
 /// Returns an error if cargo or a project cannot be started.
 pub(crate) fn run() -> anyhow::Result<u8> {
-    let folder = tree::root().join("tests/downstream");
+    let folder = folder();
     // The main workspace's folder: what has the same features there is not compiled again.
     let target = tree::root().join("target");
     let mut build = cargo(&["build", "--release", "--locked"]);

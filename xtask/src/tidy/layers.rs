@@ -63,6 +63,7 @@ const ROOMS: [Room; 16] = [
     ),
     // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
     room(5, "sharp-draw", &["sharp-space"], &[]),
+    // Reports of suites have figures.
     room(
         5,
         "sharp-bench",

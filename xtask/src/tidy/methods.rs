@@ -6,6 +6,8 @@ use crate::tree::Tree;
 
 /// The one file that names the methods and may tell them apart.
 const OWNER: &str = "crates/sharp-plan/src/method.rs";
+/// The crate in which `method` always means a `Method`.
+const CRATE: &str = "crates/sharp-plan/";
 /// The named methods. A library takes a method as an argument; only a command may choose one.
 const NAMED: [&str; 3] = ["Method::fast", "Method::paper", "Method::prior"];
 
@@ -21,7 +23,9 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
                 format!("{message}: make it a field of `Method`"),
             ));
         };
-        for at in branches(&code) {
+        // Outside sharp-plan the word may mean something else, unless the file names the type or asks for `name`.
+        let is_meant = path.starts_with(CRATE) || words(&code, "Method").next().is_some();
+        for at in branches(&code).filter(|&at| is_meant || asks_for_name(&code[at..])) {
             report(at, "asks which method is at work");
         }
         if !path.starts_with("crates/sharp-cli/") {
@@ -54,6 +58,15 @@ fn branches(code: &str) -> impl Iterator<Item = usize> {
     matched.chain(tested).chain(compared)
 }
 
+/// Returns true if the branch at the start of `code` is about the field `name` of a method.
+fn asks_for_name(code: &str) -> bool {
+    let head = &code[..code.find(['{', ',', '=']).unwrap_or(code.len())];
+    head.match_indices("method.name").any(|(at, name)| {
+        let rest = &head[at + name.len()..];
+        !rest.starts_with('(') && !rest.starts_with(is_word)
+    })
+}
+
 /// Returns true if `expression` is a method or its name, or a tuple with one; not if a call merely takes one.
 fn is_method(expression: &str) -> bool {
     let is_argument = |at: usize| {
@@ -80,11 +93,11 @@ mod tests {
     #[test]
     fn branches_on_a_method_stand_in_its_file_only() {
         for code in [
-            "match method { _ => 1 }",
+            "match method { _ => Method::new() }",
             "match &self.method.name.as_str() { _ => 1 }",
-            "match (spec.method, 1) { _ => 1 }",
+            "match (spec.method, 1) { _ => 1 }\nuse sharp_plan::Method;",
             "if problem.method.name == \"paper\" {}",
-            "if method != other {}",
+            "if method != Method::default() {}",
             "if matches!(method.name.as_str(), \"paper\") {}",
         ] {
             assert_eq!(problems("crates/sharp-plan/src/repair.rs", code), 1, "{code}");
@@ -102,6 +115,15 @@ mod tests {
             "let method = other;",
         ] {
             assert_eq!(problems("crates/sharp-plan/src/repair.rs", code), 0, "{code}");
+        }
+    }
+
+    #[test]
+    fn elsewhere_the_word_may_mean_something_else() {
+        for code in
+            ["match spec.method { _ => 1 }", "if args.method == Baseline::Rrt {}", "match method.name() {}"]
+        {
+            assert_eq!(problems("crates/sharp-bench/src/jobs.rs", code), 0, "{code}");
         }
     }
 

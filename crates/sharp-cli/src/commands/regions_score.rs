@@ -25,7 +25,7 @@ const THRESHOLDS: [f64; 7] = [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 const DOORWAY_THRESHOLDS: [f64; 6] = [0.02, 0.05, 0.1, 0.15, 0.25, 1.1];
 
 #[derive(Serialize)]
-struct ScoreReport {
+struct RegionScoreReport {
     schema: &'static str,
     robot: String,
     maps: usize,
@@ -128,7 +128,8 @@ fn score(
     }
     let [net, geometric, random, grid] = scores.map(|scores| RegionScore::mean(&scores));
     let (robot, maps) = (robot.name.clone(), maps.len());
-    let report = ScoreReport { schema: "sharp.regions.score/1", robot, maps, net, geometric, random, grid };
+    let report =
+        RegionScoreReport { schema: "sharp.regions.score/1", robot, maps, net, geometric, random, grid };
     if json {
         say!("{}", to_json(&report));
         return Ok(Exit::Done);

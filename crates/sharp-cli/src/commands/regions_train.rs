@@ -25,7 +25,7 @@ use crate::{input, pictures, progress};
 const SAMPLE_PX: u32 = 440;
 
 #[derive(Serialize)]
-struct TrainReport {
+struct RegionTrainReport {
     schema: &'static str,
     robot: String,
     device: String,
@@ -37,11 +37,11 @@ struct TrainReport {
     steps: usize,
     file: String,
     bytes: usize,
-    time_s: TrainTimes,
+    time_s: RegionTrainTimes,
 }
 
 #[derive(Serialize)]
-struct TrainTimes {
+struct RegionTrainTimes {
     labels: f64,
     train: f64,
     total: f64,
@@ -69,7 +69,7 @@ pub(crate) fn run(args: &RegionsTrain, seed: u64, json: bool) -> Result<Exit, Fa
     };
     let bytes = predictor.to_bytes();
     write_atomic(&args.out, &bytes)?;
-    let report = TrainReport {
+    let report = RegionTrainReport {
         schema: "sharp.regions.train/1",
         robot: robot.name,
         device: args.device.clone(),
@@ -81,7 +81,7 @@ pub(crate) fn run(args: &RegionsTrain, seed: u64, json: bool) -> Result<Exit, Fa
         steps: settings.steps,
         file: args.out.display().to_string(),
         bytes: bytes.len(),
-        time_s: TrainTimes { labels, train: total - labels, total },
+        time_s: RegionTrainTimes { labels, train: total - labels, total },
     };
     if json {
         say!("{}", to_json(&report));

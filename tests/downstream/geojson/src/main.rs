@@ -22,11 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     if states.is_empty() || options.options().is_empty() {
         return Err(format!("map {map} has {} states", states.len()).into());
     }
-    let features: Vec<String> = states
-        .states()
-        .map(|state| state_feature(&states, state))
-        .chain(option_features(&options))
-        .collect();
+    let features: Vec<String> =
+        states.states().map(|state| state_feature(&states, state)).chain(option_features(&options)).collect();
     println!(r#"{{"type":"FeatureCollection","features":[{}]}}"#, features.join(",\n"));
     Ok(())
 }

@@ -10,8 +10,8 @@ use sharp_plan::{Answer, Method, Query, RunSettings, Sharp, run, success};
 use sharp_sim::conformance::check_simulator;
 use sharp_sim::{NoiseModel, ObstacleMap, RobotModel, RobotState, Simulator, StepInfo, WheelCommand};
 use sharp_space::{
-    Cell, Detection, DistanceField, Footprint, Heading, OccupancyGrid, Point, Pose, Region, RegionId, Seed,
-    Stream, Vector, trig,
+    Cell, Detection, DistanceField, Footprint, Heading, OccupancyGrid, Point, Pose, Region, RegionDetector,
+    RegionId, Seed, Stream, Vector, trig,
 };
 
 const ROOMS: &str = "
@@ -116,12 +116,17 @@ fn straight(from: Point, to: Point, request: &GuideRequest<'_>, robot: &GuideRob
     (way.norm() > 0.0 && poses.iter().all(is_good)).then_some(poses)
 }
 
-/// One region in the middle of each room and one in the gap.
-fn regions(grid: &OccupancyGrid, _: &Footprint) -> Detection {
-    let field = DistanceField::new(grid);
-    let columns = [7, 14, 21].into_iter().zip(0..);
-    let region = |(col, id)| Region::new(RegionId(id), vec![Cell::new(col, 5)], &field);
-    Detection::new(columns.filter_map(region).collect(), "list")
+/// Knows its regions: one in the middle of each room and one in the gap.
+#[derive(Debug)]
+struct ThreePlaces;
+
+impl RegionDetector for ThreePlaces {
+    fn detect(&self, grid: &OccupancyGrid, _: &Footprint) -> Detection {
+        let field = DistanceField::new(grid);
+        let columns = [7, 14, 21].into_iter().zip(0..);
+        let region = |(col, id)| Region::new(RegionId(id), vec![Cell::new(col, 5)], &field);
+        Detection::new(columns.filter_map(region).collect(), "list")
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -132,7 +137,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let world = World::new(OccupancyGrid::from_ascii(0.4, ROOMS)?, robot);
     let simulator = Unicycle::new(Arc::clone(&world.obstacles), &world.robot);
     let method = Method::fast().with_guide_planner(Arc::new(OneCorner)).with_episodes(100, 100, 100);
-    let mut sharp = Sharp::new(world, regions)
+    let mut sharp = Sharp::new(world, ThreePlaces)
         .with_simulator(Box::new(simulator.clone()))
         .with_method(method)
         .with_noise(NoiseModel::nominal());
@@ -142,7 +147,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         Answer::NoPlan(reason) => return Err(reason.into()),
         Answer::Stopped => return Err("nobody stopped it".into()),
     };
-    let settings = RunSettings { simulator: Box::new(simulator), ..RunSettings::new(&plan, 50, Seed(2)) };
+    let mut settings = RunSettings::new(&plan, 50, Seed(2));
+    settings.simulator = Box::new(simulator);
     let driven = success(&run(&plan, &settings, &|| 0.0));
     println!("predicted {:?}, driven {driven:?}", plan.solution.predicted);
     assert!(plan.solution.predicted.rate() > 0.9 && driven.rate() > 0.9, "two rooms and a wide gap");
