@@ -1,17 +1,24 @@
 //! Drawn problems for all baselines, and controllers that only a test would let drive.
 
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
 use rayon::ThreadPoolBuilder;
 use sharp_drive::{
     Command, Controller, Decision, EpisodeEnd, Motion, MppiSettings, ProfiledFollower, Readiness, Supervisor,
     World,
 };
 use sharp_motion::{Budget, RrtSettings};
-use sharp_plan::Query;
+use sharp_plan::{Answer, Conditions, Method, Query, Sharp};
+use sharp_rl::Progress;
 use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
-use sharp_space::{OccupancyGrid, Pose, Seed};
+use sharp_space::{
+    Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose, Region, RegionDetector, RegionId, Seed,
+};
 
 use super::*;
-use crate::contender::{ComparisonSettings, Contender, Driven, compare};
+use crate::conformance::check_contender;
+use crate::contender::{ComparisonSettings, Composed, Contender, Driven, compare};
 
 /// A hall of 10 by 4 m, 0.4 m a cell.
 const HALL: &str = "
@@ -72,33 +79,75 @@ fn rrt<'a>(planner: &'a RoutePlanner<'a>, world: &'a World, query: Query, contac
     Rrt { world, planner, query, settings, contact_ends, seed: Seed(2) }
 }
 
-/// Lets every method that plans drive `query` and hands what came of it to `check`.
+/// Hands every system that plans to `check`, prepared for `query` under `noise`.
+fn each_system(
+    world: &World,
+    query: Query,
+    (noise, contact_ends): (&NoiseModel, bool),
+    check: impl Fn(&str, &dyn Contender),
+) {
+    let planner = &RoutePlanner::new(world, query.goal);
+    let route = planner.plan_from(query.start).expect("there is a way");
+    let (robot, noise) = (&world.robot, noise.clone());
+    let follower = ProfiledFollower::tuned(robot, &noise);
+    let settings = MppiSettings { samples: 16, ..MppiSettings::new(robot, &noise) };
+    let seed = Seed(3);
+    let mpc = Mpc { world, planner, query, route: route.clone(), settings, noise: noise.clone(), seed };
+    let track = Track { world, planner, query, route, follower, noise };
+    let rrt = rrt(planner, world, query, contact_ends);
+    let systems: [(&str, &dyn Contender); 3] = [("rrt", &rrt), ("track", &track), ("mppi", &mpc)];
+    for (name, system) in systems {
+        check(name, system);
+    }
+}
+
+/// Lets every system that plans drive `query` and hands what came of it to `check`.
 fn each_drives(
     world: &World,
     query: Query,
     settings: &ComparisonSettings,
     check: impl Fn(&str, Vec<Driven>),
 ) {
-    let planner = &RoutePlanner::new(world, query.goal);
-    let route = planner.plan_from(query.start).expect("there is a way");
-    let (robot, noise) = (&world.robot, settings.noise.clone());
-    let follower = ProfiledFollower::tuned(robot, &noise);
-    let mppi = MppiSettings { samples: 16, ..MppiSettings::new(robot, &noise) };
-    let mpc = Mpc {
-        world,
-        planner,
-        query,
-        route: route.clone(),
-        settings: mppi,
-        noise: noise.clone(),
-        seed: Seed(3),
-    };
-    let track = Track { world, planner, query, route, follower, noise };
-    let rrt = rrt(planner, world, query, settings.contact_ends);
-    let methods: [(&str, &dyn Contender); 3] = [("rrt", &rrt), ("track", &track), ("mppi", &mpc)];
-    for (name, method) in methods {
-        check(name, compare(method, world, &query, settings, &Supervisor::silent()));
+    each_system(world, query, (&settings.noise, settings.contact_ends), |name, system| {
+        check(name, compare(system, world, &query, settings, &Supervisor::silent()));
+    });
+}
+
+/// Finds one critical region at each end of the hall.
+struct BothEnds;
+
+impl RegionDetector for BothEnds {
+    fn detect(&self, grid: &OccupancyGrid, _: &Footprint) -> Detection {
+        let field = DistanceField::new(grid);
+        let region = |id, col| Region::new(RegionId(id), vec![Cell::new(col, 5)], &field).expect("one cell");
+        Detection::new(vec![region(0, 5), region(1, 19)], "ends")
     }
+}
+
+/// SHARP in the hall.
+fn composed(world: &World, query: Query) -> Composed {
+    let method = Method::prior().with_episodes(50, 50, 50);
+    let answer = Sharp::new(world.clone(), BothEnds).with_method(method).solve(query, &()).expect("room");
+    let Answer::Solved(plan) = answer else { panic!("{answer:?}") };
+    Composed { plan: Arc::new(*plan), recovery: true }
+}
+
+#[test]
+fn our_contenders_conform() {
+    let world = world(HALL, RobotModel::husky());
+    let query = query((1.0, 2.2), (9.0, 2.2));
+    for contact_ends in [true, false] {
+        each_system(&world, query, (&NoiseModel::nominal(), contact_ends), |name, system| {
+            assert_eq!(check_contender(system, &world, &query), Ok(()), "{name}");
+        });
+    }
+    assert_eq!(check_contender(&composed(&world, query), &world, &query), Ok(()), "sharp");
+    let conditions = Conditions::new(&world, NoiseModel::nominal());
+    let budget = SacBudget { max_env_steps: 200, horizon_s: 10.0 };
+    let mut unwatched = |_: &Progress<'_>| ControlFlow::Continue(());
+    let flat = FlatSac::learn(&world, query, (&conditions, Seed(1)), budget, &mut unwatched);
+    let flat = flat.expect("a sound task");
+    assert_eq!(check_contender(&flat, &world, &query), Ok(()), "sac");
 }
 
 #[test]
