@@ -5,16 +5,22 @@
 
 use std::time::{Duration, Instant};
 
+use anyhow::ensure;
+
 use crate::process::{cargo, exit_code};
 use crate::{downstream, examples, packages, tidy};
 
-/// Runs the steps in order up to the first that fails, and says how long each took.
+/// Runs the steps in order up to the first that fails, and says how long each took; with `names` only these.
 ///
 /// # Errors
-/// Returns an error if a step cannot be started.
-pub(crate) fn run() -> anyhow::Result<u8> {
+/// Returns an error if a name is unknown or a step cannot be started.
+pub(crate) fn run(names: &[String]) -> anyhow::Result<u8> {
+    let unknown = names.iter().find(|name| !STEPS.iter().any(|(step, _)| step == name));
+    ensure!(unknown.is_none(), "no step is called {}", unknown.map_or("", String::as_str));
     let mut times: Vec<(&str, Duration, u8)> = Vec::new();
-    for (name, step) in STEPS {
+    for (name, step) in
+        STEPS.into_iter().filter(|(step, _)| names.is_empty() || names.iter().any(|name| name == step))
+    {
         eprintln!("\n=== {name}");
         let start = Instant::now();
         let code = step()?;

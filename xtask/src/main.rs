@@ -30,8 +30,8 @@ use crate::tree::Tree;
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
-  ci                     everything that must pass: format, tidy, packages, clippy, docs, tests,
-                         examples, and the projects in tests/downstream
+  ci [STEPS]             everything that must pass: format, tidy, packages, clippy, docs, tests,
+                         examples, downstream; or only the steps named
   tidy                   house rules that no compiler checks
   stats                  a table of lines, functions and docs of each crate
   train-regions [ARGS]   sharp regions train ARGS, on the ndarray device by default
@@ -52,7 +52,7 @@ fn main() -> ExitCode {
         None => ("help", &[][..]),
     };
     let outcome = match command {
-        "ci" => ci::run(),
+        "ci" => ci::run(rest),
         "tidy" => tidy::run(),
         "stats" => Tree::load().map(|tree| {
             print!("{}", stats::table(&tree));
