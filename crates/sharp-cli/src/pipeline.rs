@@ -13,7 +13,7 @@ use sharp_regions::{
     GeometricDetector, GridDetector, Heatmap, ListDetector, NetworkDetector, RandomDetector, RegionCount,
     RegionPredictor,
 };
-use sharp_sim::{NoiseModel, RobotModel};
+use sharp_sim::{NoiseModel, RobotModel, SimulatorKind};
 use sharp_space::{Detection, GridFrame, Point, RegionDetector, Seed};
 
 use crate::args::{AbstractionArgs, Kind, Learning, Metric};
@@ -114,7 +114,7 @@ pub(crate) fn shipped(robot: &RobotModel) -> RegionPredictor {
 pub(crate) fn library(
     choice: Option<&str>,
     world: &World,
-    noise: &NoiseModel,
+    conditions: (SimulatorKind, &NoiseModel),
     learning: Learning,
 ) -> Result<OptionLibrary, Failure> {
     let root = match choice {
@@ -122,13 +122,20 @@ pub(crate) fn library(
         Some(folder) => PathBuf::from(folder),
         None => cache_folder(),
     };
-    Ok(OptionLibrary::open(&root, &library_key(world, noise, learning))?)
+    Ok(OptionLibrary::open(&root, &library_key(world, conditions, learning))?)
 }
 
-/// Options learnt in one world say nothing about another: the key names robot, noise, method and format,
-/// and then the map.
-fn library_key(world: &World, noise: &NoiseModel, learning: Learning) -> String {
-    let key = format!("{:?} {noise:?} {learning:?} {FORMAT}", world.robot);
+/// Options learnt in one world say nothing about another: the key names robot, noise, method, format and
+/// any simulator but the usual one, and then the map.
+fn library_key(
+    world: &World,
+    (simulator, noise): (SimulatorKind, &NoiseModel),
+    learning: Learning,
+) -> String {
+    let mut key = format!("{:?} {noise:?} {learning:?} {FORMAT}", world.robot);
+    if simulator != SimulatorKind::Kinematic {
+        key += &format!(" {simulator:?}");
+    }
     let key = &hash(key.as_bytes())[..8];
     format!("{}-{key}-{}", world.robot.name, &map_hash(&world.grid)[..16])
 }

@@ -122,6 +122,8 @@ pub(crate) struct SolveReport {
     pub(crate) learning: &'static str,
     pub(crate) cost_update: &'static str,
     pub(crate) noise: String,
+    /// Where policies were learnt and the plan was verified.
+    pub(crate) simulator: String,
     pub(crate) seed: u64,
     /// The folder of the library, or "none".
     pub(crate) library: String,

@@ -271,7 +271,7 @@ fn what_was_switched_off_is_named_in_report_and_plan() {
         assert_eq!((&leg["policy"], &leg["gradient_steps"]), (&"learnt".into(), &0.into()), "{leg}");
     }
     let plan = fs::read_to_string(folder.path().join("plan/plan.ron")).unwrap();
-    for line in ["learning: prior", "cost_update: false", "gain_sd: 0.1", "failure_cost_s: 50"] {
+    for line in ["method: \"prior\"", "cost_update: false", "gain_sd: 0.1", "failure_cost_s: 50"] {
         assert!(plan.contains(line), "no {line} in {plan}");
     }
 }

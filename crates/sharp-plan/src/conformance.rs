@@ -180,14 +180,27 @@ fn hall() -> (World, Arc<GuidedOption>) {
 #[cfg(test)]
 mod tests {
     use sharp_drive::{Follower, OptionPolicy};
+    use sharp_rl::{StopRule, TrainSettings};
 
     use super::*;
-    use crate::learn::{LearningMonitor, PriorOnly, Selection};
+    use crate::learn::{LearningMonitor, PaperProtocol, PriorOnly, Selection};
+
+    /// The paper's protocol with a budget that only shows that it runs.
+    fn tiny_paper() -> PaperProtocol {
+        PaperProtocol::new(TrainSettings::default().with(|train| {
+            train.sac.hidden = vec![16, 16];
+            train.sac.batch = 32;
+            train.max_env_steps = 600;
+            train.evaluate_every = 300;
+            train.evaluation_episodes = 2;
+            train.stop = StopRule::Never;
+        }))
+    }
 
     #[test]
     fn our_learners_conform() {
         let selection = Selection { screening_episodes: 20, ..Selection::default() };
-        let learners: [&dyn OptionLearner; 2] = [&PriorOnly, &selection];
+        let learners: [&dyn OptionLearner; 3] = [&PriorOnly, &selection, &tiny_paper()];
         for learner in learners {
             assert_eq!(check_option_learner(learner), Ok(()), "{learner:?}");
         }

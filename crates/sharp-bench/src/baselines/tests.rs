@@ -10,6 +10,7 @@ use sharp_drive::{
 };
 use sharp_motion::{Budget, RrtSettings};
 use sharp_plan::{Answer, Conditions, Method, Query, Sharp};
+use sharp_rl::Progress;
 use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
 use sharp_space::{
     Cell, Detection, DistanceField, Footprint, OccupancyGrid, Pose, Region, RegionDetector, RegionId, Seed,
@@ -78,84 +79,75 @@ fn rrt<'a>(planner: &'a RoutePlanner<'a>, world: &'a World, query: Query, contac
     Rrt { world, planner, query, settings, contact_ends, seed: Seed(2) }
 }
 
-/// Hands every contender that plans, prepared for `query`, to `check`.
-fn each(
+/// Hands every system that plans to `check`, prepared for `query` under `noise`.
+fn each_system(
     world: &World,
     query: Query,
-    settings: &ComparisonSettings,
-    mut check: impl FnMut(&str, &dyn Contender),
+    (noise, contact_ends): (&NoiseModel, bool),
+    check: impl Fn(&str, &dyn Contender),
 ) {
     let planner = &RoutePlanner::new(world, query.goal);
     let route = planner.plan_from(query.start).expect("there is a way");
-    let (robot, noise) = (&world.robot, settings.noise.clone());
+    let (robot, noise) = (&world.robot, noise.clone());
     let follower = ProfiledFollower::tuned(robot, &noise);
-    let mppi = MppiSettings { samples: 16, ..MppiSettings::new(robot, &noise) };
-    let mpc = Mpc {
-        world,
-        planner,
-        query,
-        route: route.clone(),
-        settings: mppi,
-        noise: noise.clone(),
-        seed: Seed(3),
-    };
+    let settings = MppiSettings { samples: 16, ..MppiSettings::new(robot, &noise) };
+    let seed = Seed(3);
+    let mpc = Mpc { world, planner, query, route: route.clone(), settings, noise: noise.clone(), seed };
     let track = Track { world, planner, query, route, follower, noise };
-    check("rrt", &rrt(planner, world, query, settings.contact_ends));
-    check("track", &track);
-    check("mppi", &mpc);
+    let rrt = rrt(planner, world, query, contact_ends);
+    let systems: [(&str, &dyn Contender); 3] = [("rrt", &rrt), ("track", &track), ("mppi", &mpc)];
+    for (name, system) in systems {
+        check(name, system);
+    }
 }
 
-/// Lets every contender that plans drive `query` and hands what came of it to `check`.
+/// Lets every system that plans drive `query` and hands what came of it to `check`.
 fn each_drives(
     world: &World,
     query: Query,
     settings: &ComparisonSettings,
     check: impl Fn(&str, Vec<Driven>),
 ) {
-    each(world, query, settings, |name, contender| {
-        check(name, compare(contender, world, &query, settings, &Supervisor::silent()));
+    each_system(world, query, (&settings.noise, settings.contact_ends), |name, system| {
+        check(name, compare(system, world, &query, settings, &Supervisor::silent()));
     });
+}
+
+/// Finds one critical region at each end of the hall.
+struct BothEnds;
+
+impl RegionDetector for BothEnds {
+    fn detect(&self, grid: &OccupancyGrid, _: &Footprint) -> Detection {
+        let field = DistanceField::new(grid);
+        let region = |id, col| Region::new(RegionId(id), vec![Cell::new(col, 5)], &field).expect("one cell");
+        Detection::new(vec![region(0, 5), region(1, 19)], "ends")
+    }
+}
+
+/// SHARP in the hall.
+fn composed(world: &World, query: Query) -> Composed {
+    let method = Method::prior().with_episodes(50, 50, 50);
+    let answer = Sharp::new(world.clone(), BothEnds).with_method(method).solve(query, &()).expect("room");
+    let Answer::Solved(plan) = answer else { panic!("{answer:?}") };
+    Composed { plan: Arc::new(*plan), recovery: true }
 }
 
 #[test]
 fn our_contenders_conform() {
-    for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let world = world(RING, robot);
-        let query = query((1.4, 4.6), (8.6, 1.4));
-        each(&world, query, &settings(&world, NoiseModel::nominal(), true), |name, contender| {
-            assert_eq!(check_contender(contender, &world, &query), Ok(()), "{name}");
-        });
-    }
-}
-
-/// A region in either half of the hall.
-#[derive(Debug)]
-struct Halves;
-
-impl RegionDetector for Halves {
-    fn detect(&self, grid: &OccupancyGrid, _: &Footprint) -> Detection {
-        let field = DistanceField::new(grid);
-        let region = |(id, col)| Region::new(RegionId(id), vec![Cell::new(col, 5)], &field);
-        Detection::new([(0, 6), (1, 18)].into_iter().filter_map(region).collect(), "halves")
-    }
-}
-
-#[test]
-fn plans_and_flat_policies_conform() {
     let world = world(HALL, RobotModel::husky());
     let query = query((1.0, 2.2), (9.0, 2.2));
-    let method = Method::prior().with_episodes(50, 50, 50);
-    let answer = Sharp::new(world.clone(), Halves).with_method(method).solve(query, &());
-    let Ok(Answer::Solved(plan)) = answer else { panic!("no plan through a hall: {answer:?}") };
-    let composed = Composed { plan: Arc::new(*plan), recovery: true };
-    assert_eq!(check_contender(&composed, &world, &query), Ok(()), "a plan");
-
+    for contact_ends in [true, false] {
+        each_system(&world, query, (&NoiseModel::nominal(), contact_ends), |name, system| {
+            assert_eq!(check_contender(system, &world, &query), Ok(()), "{name}");
+        });
+    }
+    assert_eq!(check_contender(&composed(&world, query), &world, &query), Ok(()), "sharp");
     let conditions = Conditions::new(&world, NoiseModel::nominal());
-    let budget = SacBudget { max_env_steps: 200, horizon_s: 60.0 };
-    let flat =
-        FlatSac::learn(&world, query, (&conditions, Seed(1)), budget, &mut |_| ControlFlow::Continue(()));
+    let budget = SacBudget { max_env_steps: 200, horizon_s: 10.0 };
+    let mut unwatched = |_: &Progress<'_>| ControlFlow::Continue(());
+    let flat = FlatSac::learn(&world, query, (&conditions, Seed(1)), budget, &mut unwatched);
     let flat = flat.expect("a sound task");
-    assert_eq!(check_contender(&flat, &world, &query), Ok(()), "a policy that learnt next to nothing");
+    assert_eq!(check_contender(&flat, &world, &query), Ok(()), "sac");
 }
 
 #[test]

@@ -49,10 +49,11 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
     let noise = input::noise(&args.noise)?;
     let robot = input::robot(&args.abstraction.robot)?;
+    let simulator = input::simulator(&args.simulator)?;
     let world = World::new(map.grid.clone(), robot);
     input::check_query(&world, &query)?;
     args.out.as_deref().map_or(Ok(()), input::check_out)?;
-    let mut library = pipeline::library(args.library.as_deref(), &world, &noise, args.learning)?;
+    let mut library = pipeline::library(args.library.as_deref(), &world, (simulator, &noise), args.learning)?;
     // Hours of training are kept at once; they are the same whatever else the library holds.
     if args.learning != Learning::Paper {
         library.defer();
@@ -62,8 +63,13 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     let monitor = SolveMonitor::new(stopwatch, time_limit, spinner, args.tensorboard.as_deref());
     let cache = library.folder().map(Path::to_owned);
     let (sharp, file) = pipeline::sharp(world, &args.abstraction, cache.as_deref(), &monitor)?;
-    let mut sharp =
-        sharp.with_method(method(args)).with_noise(noise).with_library(library).with_seed(Seed(seed));
+    let simulator = sharp.world().simulator(simulator);
+    let mut sharp = sharp
+        .with_method(method(args))
+        .with_noise(noise)
+        .with_simulator(simulator)
+        .with_library(library)
+        .with_seed(Seed(seed));
     let answer = sharp.solve(query, &monitor)?;
     let stopwatch = monitor.into_stopwatch();
 
@@ -124,6 +130,7 @@ fn blank_report(
         learning: args.learning.name(),
         cost_update: args.cost_update.name(),
         noise: args.noise.clone(),
+        simulator: args.simulator.clone(),
         seed,
         library: sharp.library().folder().map_or("none".to_owned(), |folder| folder.display().to_string()),
         map: MapReport::new(&map.name, &map.grid),

@@ -152,6 +152,9 @@ fn solve_and_drive(
     Ok(Some(line))
 }
 
+/// The simulator of learning and verification: not the one that evaluates.
+const TRAINING_SIMULATOR: &str = "kinematic";
+
 fn solve_args(spec: &Spec, sharp: &SharpSpec, problem: usize, [library, out]: [PathBuf; 2]) -> Solve {
     Solve {
         map: map_args(&spec.env),
@@ -166,6 +169,7 @@ fn solve_args(spec: &Spec, sharp: &SharpSpec, problem: usize, [library, out]: [P
         problem: Some(problem),
         learning: sharp.learning,
         noise: spec.noise.clone(),
+        simulator: TRAINING_SIMULATOR.to_owned(),
         cost_update: sharp.cost_update,
         failure_cost: FAILURE_COST_S,
         guide: Guide::Ridge,
