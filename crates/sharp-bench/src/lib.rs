@@ -1,31 +1,70 @@
-//! How SHARP is compared with other systems: contenders, baselines, suites and the jobs they consist of.
+//! How SHARP is compared with other systems: contenders, baselines, experiments, and the engines that run them.
 //!
 //! The nouns: a [`Contender`] is a system that was prepared for one problem; it gives each episode a controller.
 //! [`compare`] lets it drive under the same simulator, noise, collision rule, success rule and time limit as all
 //! others. [`Rrt`] and [`FlatSac`] are the paper's baselines, [`Track`] and [`Mpc`] what an engineer would use,
-//! [`Composed`] is SHARP. A [`ResultLine`] is what one method did on one problem; [`write_report`] turns many of
-//! them into tables, figures and one page. Equal results give equal bytes.
+//! [`Composed`] is SHARP. [`solve`] and [`measure`] take one problem from names and numbers to a report.
+//!
+//! An [`Experiment`] is everything that decides the results of one system in one environment. A [`Manifest`] lists
+//! experiments as jobs, an [`Engine`] does them: [`LocalEngine`] on threads, [`SlurmEngine`] on a cluster. A
+//! [`ResultLine`] is what one system did on one problem; [`write_report`] turns many of them into tables, figures and
+//! one page. Equal results give equal bytes.
 //!
 //! ```
-//! use sharp_bench::{ResultLine, totals};
+//! use sharp_bench::{Engine, LocalEngine, Manifest, Suite, SuiteSelection, merge, totals};
 //!
-//! let line = ResultLine::example("a", "limo", "interface", 1);
-//! let table = totals(&[&line]);
-//! assert!(table.contains("| sharp interface | nominal | limo | 20/20 |"), "{table}");
+//! let mut selection = SuiteSelection::new(Suite::Smoke, 1);
+//! selection.systems = vec!["track".into()];
+//! selection.problems = vec![1];
+//! selection.episodes = 5;
+//! let folder = tempfile::tempdir().unwrap();
+//! let (manifest, jobs) = Manifest::extend(folder.path(), selection.experiments()?, "an example")?;
+//! LocalEngine { workers: 1 }.run(&manifest, &jobs, &())?;
+//! let merged = merge(&manifest)?;
+//! let table = totals(&merged.lines().collect::<Vec<_>>());
+//! assert!(table.contains("| track | nominal | husky | 5/5 |"), "{table}");
+//! # Ok::<(), sharp_bench::BenchError>(())
 //! ```
 
 pub mod conformance;
+pub mod named;
+pub mod pictures;
 
 mod baselines;
 mod contender;
+mod curves;
+mod error;
 mod evaluation;
+mod jobs;
+mod json;
+mod measure;
+mod reports;
 mod result;
+mod solve;
+mod stopwatch;
+mod tensorboard;
 mod times;
 
 pub use baselines::{FlatSac, Mpc, RoutePlanner, Rrt, SacBudget, Track};
 pub use contender::{ComparisonSettings, Composed, Contender, Driven, compare};
+pub use curves::CurveFolder;
+pub use error::BenchError;
 pub use evaluation::{ReportError, ReportInput, table, totals, write_report};
+pub use jobs::{
+    Done, Ended, Engine, EngineMonitor, Experiment, Inputs, Job, LocalEngine, Manifest, Merged,
+    SharpSettings, SlurmEngine, SlurmScripts, Submission, Suite, SuiteSelection, System, clean,
+    count_results, merge, run_job, unfinished,
+};
+pub use json::to_json;
+pub use measure::{BaselineKind, BaselineSettings, MeasureMonitor, measure};
+pub use named::{InputError, NamedProblem};
+pub use reports::{
+    BaselineReport, BaselineTimes, MapReport, OptionReport, Predicted, RunReport, SolveReport, Verified,
+};
 pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
 };
+pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
+pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
+pub use tensorboard::EventFile;
 pub use times::{DecisionTimes, Reuse, SolveTimes};

@@ -1,6 +1,7 @@
 //! What a result says of time and of reuse.
 
 use serde::{Deserialize, Serialize};
+use sharp_drive::EpisodeRecord;
 
 /// How many of the options that a plan uses had been learnt before.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -50,4 +51,17 @@ pub struct DecisionTimes {
     pub p50: f64,
     /// 99 % take no longer.
     pub p99: f64,
+}
+
+impl DecisionTimes {
+    /// Those of all decisions in `records`; 0 if there were none.
+    pub(crate) fn of<'a>(records: impl Iterator<Item = &'a EpisodeRecord>) -> Self {
+        let mut times: Vec<f64> = records.flat_map(|record| record.decisions_us.iter().copied()).collect();
+        times.sort_by(f64::total_cmp);
+        let quantile = |share: f64| {
+            let last = times.len().saturating_sub(1);
+            times.get(((times.len() as f64 * share) as usize).min(last)).copied().unwrap_or(0.0)
+        };
+        Self { p50: quantile(0.5), p99: quantile(0.99) }
+    }
 }

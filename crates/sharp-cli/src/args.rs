@@ -5,14 +5,11 @@ mod suites;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use serde::{Deserialize, Serialize};
+use sharp_bench::{AbstractionRequest, BaselineKind, BaselineSettings};
+use sharp_options::OptionKind;
+use sharp_rbvd::CellMetric;
 
-pub(crate) use suites::{Engine, Eval, Jobs, Submit, Suite, SuiteSelection, SystemName};
-
-/// Samples of one plan of the baseline `rrt`, unless asked otherwise.
-pub(crate) const RRT_SAMPLES: usize = 30_000;
-/// Environment steps that the baseline `sac` may learn from, unless asked otherwise.
-pub(crate) const MAX_ENV_STEPS: u64 = 1_000_000;
+pub(crate) use suites::{EngineName, Eval, Jobs, Submit, SuiteArgs};
 
 /// From a map to a policy that knows its odds: option learning for stochastic path planning.
 #[derive(Debug, Parser)]
@@ -92,15 +89,13 @@ pub(crate) enum Unknown {
 }
 
 /// The kind of option.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Kind {
     Centroid,
     Interface,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Learning {
     /// Followers and the shipped prior by their certificates; training where none holds.
     Fast,
@@ -142,6 +137,23 @@ pub(crate) struct AbstractionArgs {
 pub(crate) enum Metric {
     Geodesic,
     Paper,
+}
+
+impl AbstractionArgs {
+    /// What the flags ask for.
+    pub(crate) fn request(&self) -> AbstractionRequest {
+        let metric = if self.metric == Metric::Paper { CellMetric::Euclidean } else { CellMetric::Geodesic };
+        AbstractionRequest { options: self.options.into(), regions: self.regions.clone(), metric }
+    }
+}
+
+impl From<Kind> for OptionKind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Centroid => Self::Centroid,
+            Kind::Interface => Self::Interface,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -219,8 +231,7 @@ pub(crate) struct Run {
     pub(crate) collisions: Collisions,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Switch {
     On,
     Off,
@@ -423,13 +434,13 @@ pub(crate) enum BaselineName {
     Sac,
 }
 
-impl BaselineName {
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Rrt => "rrt",
-            Self::Track => "track",
-            Self::Mppi => "mppi",
-            Self::Sac => "sac",
+impl From<BaselineName> for BaselineKind {
+    fn from(name: BaselineName) -> Self {
+        match name {
+            BaselineName::Rrt => Self::Rrt,
+            BaselineName::Track => Self::Track,
+            BaselineName::Mppi => Self::Mppi,
+            BaselineName::Sac => Self::Sac,
         }
     }
 }
@@ -470,10 +481,10 @@ pub(crate) struct Baseline {
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
     /// Samples of one plan of rrt; a plan that takes more has failed.
-    #[arg(long, value_name = "N", default_value_t = RRT_SAMPLES)]
+    #[arg(long, value_name = "N", default_value_t = BaselineSettings::RRT_SAMPLES)]
     pub(crate) rrt_samples: usize,
     /// Environment steps that sac may learn from; unlike a time limit they give equal bytes.
-    #[arg(long, value_name = "N", default_value_t = MAX_ENV_STEPS)]
+    #[arg(long, value_name = "N", default_value_t = BaselineSettings::MAX_ENV_STEPS)]
     pub(crate) max_env_steps: u64,
     /// Write learning curves for TensorBoard there, of sac [default: none].
     #[arg(long, value_name = "DIR")]

@@ -1,20 +1,14 @@
-//! Turning what was typed into maps, robots, noises and poses, or into one clear message.
+//! Turning what was typed into maps, poses and folders, or into one clear message.
 
-use std::fs;
-use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use sharp_drive::World;
 use sharp_maps::{LoadOptions, MapFile, load};
 use sharp_plan::Query;
-use sharp_sim::{NoiseError, NoiseModel, RobotModel, SimulatorKind, UnknownSimulator};
+use sharp_sim::{SimulatorKind, UnknownSimulator};
 use sharp_space::Pose;
 
 use crate::args::{MapArgs, Unknown};
 use crate::outcome::Failure;
-
-/// Larger than any description of a robot, a noise or regions.
-const TEXT_MAX_BYTES: u64 = 1 << 20;
 
 /// Reads the map that `args` name.
 pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
@@ -30,54 +24,9 @@ pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
     Ok(map)
 }
 
-/// The robot called `name`, or described by the file of that name.
-pub(crate) fn robot(name: &str) -> Result<RobotModel, Failure> {
-    match name {
-        "husky" => Ok(RobotModel::husky()),
-        "limo" => Ok(RobotModel::limo()),
-        file => {
-            let text = read_text(file, "robot", "husky, limo or a robot file")?;
-            RobotModel::from_ron(&text)
-                .map_err(|error| Failure::new("ROBOT_INVALID", format!("{file}: {error}")))
-        }
-    }
-}
-
-/// The noise called `name`, or described by the file of that name.
-pub(crate) fn noise(name: &str) -> Result<NoiseModel, Failure> {
-    match NoiseModel::by_name(name) {
-        Ok(noise) => return Ok(noise),
-        Err(NoiseError::Name(_)) => {}
-        Err(error) => return Err(Failure::new("NOISE_INVALID", error.to_string())),
-    }
-    let text =
-        read_text(name, "noise", "none, nominal, harsh, biased, one of them as nominal*2, or a noise file")?;
-    NoiseModel::from_ron(&text).map_err(|error| Failure::new("NOISE_INVALID", format!("{name}: {error}")))
-}
-
 /// The simulator called `name`.
 pub(crate) fn simulator(name: &str) -> Result<SimulatorKind, Failure> {
     name.parse().map_err(|error: UnknownSimulator| Failure::new("USAGE", format!("--simulator: {error}")))
-}
-
-/// The content of a small text file.
-pub(crate) fn read_text(file: &str, what: &str, expected: &str) -> Result<String, Failure> {
-    let refuse =
-        |why: &str| Failure::new("FILE_UNREADABLE", format!("{what} {file:?} {why}, expected {expected}"));
-    let metadata = fs::metadata(file).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => refuse("is no known name and no file"),
-        _ => refuse(&format!("cannot be read: {error}")),
-    })?;
-    if !metadata.is_file() {
-        return Err(refuse(if metadata.is_dir() { "is a folder" } else { "is no regular file" }));
-    }
-    if metadata.len() > TEXT_MAX_BYTES {
-        return Err(refuse("is larger than 1 MiB"));
-    }
-    fs::read_to_string(file).map_err(|error| match error.kind() {
-        ErrorKind::InvalidData => refuse("is not UTF-8 text"),
-        _ => refuse(&format!("cannot be read: {error}")),
-    })
 }
 
 /// A pose typed as `X,Y,YAW`.
@@ -95,6 +44,23 @@ pub(crate) fn pose(flag: &str, text: &str) -> Result<Pose, Failure> {
     Ok(Pose::new(x, y, yaw))
 }
 
+/// The folder of the library for `choice`: a folder, `none` for no library, by default a cache folder.
+pub(crate) fn library(choice: Option<&str>) -> Option<PathBuf> {
+    match choice {
+        Some("none") => None,
+        Some(folder) => Some(folder.into()),
+        None => Some(cache_folder()),
+    }
+}
+
+fn cache_folder() -> PathBuf {
+    let set = |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    set("XDG_CACHE_HOME")
+        .or_else(|| set("HOME").map(|home| home.join(".cache")))
+        .unwrap_or_else(std::env::temp_dir)
+        .join("sharp")
+}
+
 /// Refuses a `folder` that could not be made or written, before the work for it is done; leaves nothing behind.
 pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
     let mut there = folder;
@@ -109,75 +75,6 @@ pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
             format!("--out is {}, but in {} no file can be made: {error}", folder.display(), there.display());
         Failure::new("FILE_INVALID", message)
     })
-}
-
-/// Verifies that both ends of `query` can be stood on.
-pub(crate) fn check_query(world: &World, query: &Query) -> Result<(), Failure> {
-    check_end(world, &query.start, "start", ["START_OUTSIDE_MAP", "START_OCCUPIED"], true)?;
-    check_end(world, &query.goal, "goal", ["GOAL_OUTSIDE_MAP", "GOAL_OCCUPIED"], false)
-}
-
-/// The goal's heading is free: there it is enough that the robot fits in some direction.
-fn check_end(
-    world: &World,
-    pose: &Pose,
-    name: &str,
-    [outside, occupied]: [&'static str; 2],
-    heading_counts: bool,
-) -> Result<(), Failure> {
-    let frame = world.grid.frame();
-    let at =
-        format!("{name} ({:.2}, {:.2}, {:.2})", pose.position.x, pose.position.y, pose.heading.radians());
-    let Some(cell) = frame.cell_at(pose.position) else {
-        let bounds = frame.bounds();
-        return Err(Failure::new(
-            outside,
-            format!(
-                "{at} lies outside the map, which reaches from ({:.2}, {:.2}) to ({:.2}, {:.2})",
-                bounds.min.x, bounds.min.y, bounds.max.x, bounds.max.y
-            ),
-        ));
-    };
-    let turned = |step: u32| Pose::at(pose.position, (pose.heading.radians() + f64::from(step) * 0.1).into());
-    let fits = if heading_counts {
-        world.geometry.is_free(*pose)
-    } else {
-        (0..63).any(|step| world.geometry.is_free(turned(step)))
-    };
-    if fits {
-        return Ok(());
-    }
-    let what = match world.grid.get(cell) {
-        sharp_space::Occupancy::Occupied => "lies in an obstacle".to_owned(),
-        sharp_space::Occupancy::Unknown => {
-            "lies in unknown space (--unknown free takes it as free)".to_owned()
-        }
-        sharp_space::Occupancy::Free => {
-            format!("is too near to an obstacle for the {}: its footprint overlaps", world.robot.name)
-        }
-    };
-    Err(Failure::new(occupied, format!("{at} {what}; {}", nearest_hint(world, pose))))
-}
-
-/// Where the robot would fit.
-fn nearest_hint(world: &World, pose: &Pose) -> String {
-    let frame = world.grid.frame();
-    let room_m = world.robot.footprint.circumscribed_radius_m() + 1.5 * frame.resolution_m;
-    let field = world.geometry.clearance();
-    let fits = (0..frame.len()).map(|index| frame.cell(index)).filter(|&cell| field.at(cell) > room_m);
-    let distance = |cell| (frame.center(cell) - pose.position).norm();
-    match fits.min_by(|&a, &b| distance(a).total_cmp(&distance(b))) {
-        Some(cell) => {
-            let point = frame.center(cell);
-            format!(
-                "the nearest place with room is ({:.2}, {:.2}), {:.2} m away",
-                point.x,
-                point.y,
-                distance(cell)
-            )
-        }
-        None => "the map has no place with room for it".to_owned(),
-    }
 }
 
 /// The query that the flags of `solve` ask for.
@@ -207,6 +104,8 @@ pub(crate) fn query(
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

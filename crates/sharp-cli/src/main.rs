@@ -7,16 +7,10 @@
 
 mod args;
 mod commands;
-mod curves;
 mod geojson;
 mod input;
-mod jobs;
 mod outcome;
-mod pictures;
-mod pipeline;
 mod progress;
-mod report;
-mod tensorboard;
 
 use std::process::ExitCode;
 

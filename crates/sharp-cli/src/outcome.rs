@@ -3,11 +3,11 @@
 use std::fmt;
 
 use serde::Serialize;
-use sharp_bench::{ReportError, ResultError};
+pub(crate) use sharp_bench::to_json;
+use sharp_bench::{BenchError, InputError, ReportError, ResultError};
 use sharp_draw::PngError;
 use sharp_maps::MapError;
 use sharp_plan::{FileError, SolveError};
-use sharp_sim::{NoiseError, RobotError};
 
 /// Exit codes of the command, the same for every subcommand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,11 +61,6 @@ impl Failure {
         Self { code, message: message.to_string() }
     }
 
-    /// The same, told with where it happened.
-    pub(crate) fn within(self, place: impl fmt::Display) -> Self {
-        Self { message: format!("{place}: {}", self.message), ..self }
-    }
-
     /// The error object of `--json`.
     pub(crate) fn to_json(&self) -> String {
         let nav2 = NAV2.iter().find(|(name, _)| *name == self.code).map(|&(_, number)| number);
@@ -86,15 +81,19 @@ impl From<MapError> for Failure {
     }
 }
 
-impl From<RobotError> for Failure {
-    fn from(error: RobotError) -> Self {
-        Self::new("ROBOT_INVALID", error)
+impl From<BenchError> for Failure {
+    fn from(error: BenchError) -> Self {
+        match error {
+            // A setting is typed as a flag.
+            BenchError::Setting { setting, problem } => Self::new("USAGE", format!("--{setting}: {problem}")),
+            error => Self::new(error.code(), error),
+        }
     }
 }
 
-impl From<NoiseError> for Failure {
-    fn from(error: NoiseError) -> Self {
-        Self::new("NOISE_INVALID", error)
+impl From<InputError> for Failure {
+    fn from(error: InputError) -> Self {
+        Self::new(error.code(), error)
     }
 }
 
@@ -106,29 +105,25 @@ impl From<FileError> for Failure {
 
 impl From<SolveError> for Failure {
     fn from(error: SolveError) -> Self {
-        match error {
-            SolveError::File(error) => error.into(),
-            error => Self::new("NO_FREE_SPACE", error),
-        }
-    }
-}
-
-impl From<ResultError> for Failure {
-    fn from(error: ResultError) -> Self {
-        Self::new("FILE_INVALID", error)
-    }
-}
-
-impl From<ReportError> for Failure {
-    fn from(error: ReportError) -> Self {
-        let code = if matches!(error, ReportError::Drawing(_)) { "FAILED" } else { "FILE_INVALID" };
-        Self::new(code, error)
+        BenchError::from(error).into()
     }
 }
 
 impl From<PngError> for Failure {
     fn from(error: PngError) -> Self {
-        Self::new("FAILED", error)
+        BenchError::from(error).into()
+    }
+}
+
+impl From<ResultError> for Failure {
+    fn from(error: ResultError) -> Self {
+        BenchError::from(error).into()
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        BenchError::from(error).into()
     }
 }
 
@@ -136,11 +131,6 @@ impl From<anyhow::Error> for Failure {
     fn from(error: anyhow::Error) -> Self {
         Self::new("FAILED", format!("{error:#}"))
     }
-}
-
-/// `value` as one line of JSON.
-pub(crate) fn to_json(value: &impl Serialize) -> String {
-    serde_json::to_string(value).expect("reports have string keys and finite numbers")
 }
 
 /// Prints a line on stdout; a reader that has gone away is no error.

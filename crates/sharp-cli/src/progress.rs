@@ -1,17 +1,15 @@
-//! Progress on a terminal, interruption, and time by phase.
+//! Progress on a terminal, and interruption.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use sharp_bench::CurveFolder;
 use sharp_guide::GuidedOption;
 use sharp_plan::{LearntPolicy, Monitor, Phase};
 use sharp_rl::Progress;
-
-use crate::curves::CurveFolder;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -30,43 +28,6 @@ pub(crate) fn is_interrupted() -> bool {
     INTERRUPTED.load(Ordering::SeqCst)
 }
 
-/// Wall time by phase, seconds.
-#[derive(Debug)]
-pub(crate) struct Stopwatch {
-    begun: Instant,
-    running: Option<(&'static str, Instant)>,
-    spent: BTreeMap<&'static str, f64>,
-}
-
-impl Stopwatch {
-    pub(crate) fn start() -> Self {
-        Self { begun: Instant::now(), running: None, spent: BTreeMap::new() }
-    }
-
-    /// Ends the running phase and begins `phase`.
-    pub(crate) fn enter(&mut self, phase: &'static str) {
-        self.stop();
-        self.running = Some((phase, Instant::now()));
-    }
-
-    /// Ends the running phase.
-    pub(crate) fn stop(&mut self) {
-        if let Some((phase, since)) = self.running.take() {
-            *self.spent.entry(phase).or_insert(0.0) += since.elapsed().as_secs_f64();
-        }
-    }
-
-    /// Seconds spent in `phase` so far.
-    pub(crate) fn spent_s(&self, phase: &str) -> f64 {
-        self.spent.get(phase).copied().unwrap_or(0.0)
-    }
-
-    /// Seconds since the start.
-    pub(crate) fn total_s(&self) -> f64 {
-        self.begun.elapsed().as_secs_f64()
-    }
-}
-
 /// A spinner on a terminal, nothing elsewhere.
 pub(crate) fn spinner(message: &str) -> ProgressBar {
     let bar = ProgressBar::new_spinner().with_message(message.to_owned());
@@ -82,61 +43,47 @@ pub(crate) fn bar(len: u64, message: &str) -> ProgressBar {
     ProgressBar::new(len).with_style(style).with_message(message.to_owned())
 }
 
-/// Watches the solver: phases to a stopwatch, legs to the terminal, interrupts and limits back.
+/// Shows on a terminal what the solver does, draws learning curves, and stops when the user does.
 pub(crate) struct SolveMonitor {
-    stopwatch: Mutex<Stopwatch>,
     spinner: ProgressBar,
     learnt: AtomicUsize,
-    deadline: Option<Instant>,
     curves: Option<Mutex<CurveFolder>>,
 }
 
 impl SolveMonitor {
     /// Shows on `spinner` what the solver does; `curves` is the folder of learning curves, if they are wanted.
-    pub(crate) fn new(
-        stopwatch: Stopwatch,
-        time_limit: Option<Duration>,
-        spinner: ProgressBar,
-        curves: Option<&Path>,
-    ) -> Self {
-        let deadline = time_limit.and_then(|limit| stopwatch.begun.checked_add(limit));
-        Self {
-            stopwatch: Mutex::new(stopwatch),
-            spinner,
-            learnt: AtomicUsize::new(0),
-            deadline,
-            curves: curves.map(|folder| Mutex::new(CurveFolder::new(folder))),
-        }
+    pub(crate) fn new(spinner: ProgressBar, curves: Option<&Path>) -> Self {
+        let curves = curves.map(|folder| Mutex::new(CurveFolder::new(folder)));
+        Self { spinner, learnt: AtomicUsize::new(0), curves }
     }
 
-    fn watch(&self) -> MutexGuard<'_, Stopwatch> {
-        self.stopwatch.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The stopwatch, once the solver is done.
-    pub(crate) fn into_stopwatch(self) -> Stopwatch {
+    /// Clears the terminal once the solver is done.
+    pub(crate) fn finish(self) {
         self.spinner.finish_and_clear();
-        self.stopwatch.into_inner().unwrap_or_else(PoisonError::into_inner)
+        warn_of_curves(self.curves);
+    }
+}
+
+/// Says why curves could not be written, if so.
+pub(crate) fn warn_of_curves(curves: Option<Mutex<CurveFolder>>) {
+    let curves = curves.map(|curves| curves.into_inner().unwrap_or_else(PoisonError::into_inner));
+    if let Some(error) = curves.as_ref().and_then(CurveFolder::failure) {
+        eprintln!("warning: learning curves are incomplete: {error}");
     }
 }
 
 impl Monitor for SolveMonitor {
     fn phase(&self, phase: Phase) {
-        let (name, message) = match phase {
-            Phase::Regions => ("regions", "predicting critical regions".to_owned()),
-            Phase::Abstraction => ("abstraction", "building the abstraction".to_owned()),
-            Phase::Search => ("search", "searching".to_owned()),
-            Phase::Guide => ("guide", "planning guides".to_owned()),
-            Phase::Learn(0) => ("learn", "every policy is at hand".to_owned()),
-            Phase::Learn(legs) => ("learn", format!("learning {legs} policies")),
-            Phase::Verify => ("verify", "running the whole plan, repairing weak legs".to_owned()),
-            _ => {
-                self.watch().stop();
-                return;
-            }
-        };
-        self.watch().enter(name);
-        self.spinner.set_message(message);
+        self.spinner.set_message(match phase {
+            Phase::Regions => "predicting critical regions".to_owned(),
+            Phase::Abstraction => "building the abstraction".to_owned(),
+            Phase::Search => "searching".to_owned(),
+            Phase::Guide => "planning guides".to_owned(),
+            Phase::Learn(0) => "every policy is at hand".to_owned(),
+            Phase::Learn(options) => format!("learning {options} policies"),
+            Phase::Verify => "running the whole plan, repairing weak options".to_owned(),
+            _ => return,
+        });
     }
 
     fn trained(&self, option: &GuidedOption, progress: &Progress<'_>) {
@@ -147,15 +94,15 @@ impl Monitor for SolveMonitor {
     }
 
     fn learnt(&self, option: &GuidedOption, learnt: &LearntPolicy) {
-        let count = self.learnt.fetch_add(1, Ordering::Relaxed) + 1;
-        let tally = learnt.estimate.count;
+        let learnt_so_far = self.learnt.fetch_add(1, Ordering::Relaxed) + 1;
+        let count = learnt.estimate.count;
         self.spinner.set_message(format!(
-            "{count} policies; {} holds {} of {}, {:.1} s",
-            option.id, tally.successes, tally.episodes, learnt.estimate.mean_time_s
+            "{learnt_so_far} policies; {} succeeds {} of {} times, {:.1} s",
+            option.id, count.successes, count.episodes, learnt.estimate.mean_time_s
         ));
     }
 
     fn should_stop(&self) -> bool {
-        is_interrupted() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+        is_interrupted()
     }
 }

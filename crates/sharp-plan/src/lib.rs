@@ -66,7 +66,7 @@ pub use method::{LearningOrder, Method, RepairSettings, SearchSettings};
 pub use option_graph::{Candidate, OptionGraph};
 pub use plan_file::{AbstractionFile, Plan, map_hash};
 pub use problem::PlanningProblem;
-pub use query::{Monitor, Phase, Query};
+pub use query::{Monitor, Phase, Query, QueryError};
 pub use search::{Search, Unplaced};
 pub use sharp::{Answer, Sharp, SolveError};
 pub use training_route::{RouteScenarios, TrainingRoute, prior_train_settings, training_routes};

@@ -13,13 +13,17 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use sharp_drive::{
     Follower, NetworkPolicy, OptionPolicy, PolicyInterface, ProfiledFollower, SuccessCount, SuccessEstimate,
+    World,
 };
 use sharp_guide::GuidePath;
 use sharp_options::OptionId;
 use sharp_rl::Actor;
+use sharp_sim::{NoiseModel, SimulatorKind};
 
 use crate::files::{self, FileError};
 use crate::learn::LearntPolicy;
+use crate::method::Method;
+use crate::plan_file::map_hash;
 
 /// Raised whenever the files change their meaning.
 pub const FORMAT: u32 = 4;
@@ -146,9 +150,35 @@ impl OptionLibrary {
         Ok(Self { folder: Some(folder), options, elsewhere, unsaved: None })
     }
 
+    /// Opens the part of the library at `root` for what `method` learns in `world` under `noise` in the simulator
+    /// called `simulator`. Options learnt in one world say nothing about another.
+    ///
+    /// # Errors
+    /// Returns an error that names the file that is damaged or of another format.
+    pub fn open_for(
+        root: &Path,
+        world: &World,
+        noise: &NoiseModel,
+        simulator: SimulatorKind,
+        method: &Method,
+    ) -> Result<Self, FileError> {
+        let mut conditions = format!("{:?} {noise:?} {} {FORMAT}", world.robot, method.name);
+        // The usual simulator is not named, so that libraries from before there was a choice stay valid.
+        if simulator != SimulatorKind::Kinematic {
+            conditions += &format!(" {simulator:?}");
+        }
+        let conditions = &files::hash(conditions.as_bytes())[..8];
+        let map = &map_hash(&world.grid)[..16];
+        let mut library = Self::open(root, &format!("{}-{conditions}-{map}", world.robot.name))?;
+        if !method.saves_at_once {
+            library.defer();
+        }
+        Ok(library)
+    }
+
     /// From now on what is inserted reaches the disk with [`save`](Self::save) only: whoever is killed
     /// before that begins anew from the same library, and so comes to the same plan.
-    pub fn defer(&mut self) {
+    pub(crate) fn defer(&mut self) {
         self.unsaved.get_or_insert_default();
     }
 

@@ -26,6 +26,9 @@ pub struct Method {
     pub search: SearchSettings,
     /// In which order the options of a plan are learnt.
     pub order: LearningOrder,
+    /// Whether a library writes each option as soon as it is learnt. Otherwise it writes them all at the end, so that
+    /// a solve that was killed begins anew from the same library and comes to the same plan.
+    pub saves_at_once: bool,
     /// Fresh episodes that estimate a policy.
     pub estimate_episodes: u32,
     /// Success wanted of an option, share of episodes.
@@ -145,6 +148,8 @@ impl Method {
                 ..SearchSettings::default()
             },
             order: LearningOrder::Independent,
+            // Hours of training are kept. What is learnt does not depend on what else the library holds.
+            saves_at_once: true,
             join_guides: false,
             usable_success: 0.0,
             ..Self::prior()
@@ -162,6 +167,7 @@ impl Method {
             guides: search.guide.to_planner(),
             search,
             order: LearningOrder::Chained,
+            saves_at_once: false,
             estimate_episodes: 1000,
             option_success: 0.99,
             failure_cost_s: FAILURE_COST_S,

@@ -1,9 +1,11 @@
 //! Problems, and how solving them may be watched.
 
 use serde::{Deserialize, Serialize};
+use sharp_drive::World;
 use sharp_guide::GuidedOption;
 use sharp_rl::Progress;
-use sharp_space::Pose;
+use sharp_space::{Occupancy, Pose};
+use thiserror::Error;
 
 use crate::learn::{LearningMonitor, LearntPolicy};
 
@@ -14,6 +16,104 @@ pub struct Query {
     pub start: Pose,
     /// The goal configuration `x_g`; its heading is free.
     pub goal: Pose,
+}
+
+/// Why a robot cannot stand at one end of a query.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum QueryError {
+    /// The pose lies outside the map.
+    #[error("{end} {problem}")]
+    Outside {
+        /// Which end: `start` or `goal`.
+        end: &'static str,
+        /// The pose, and where the map is.
+        problem: String,
+    },
+    /// The robot does not fit there.
+    #[error("{end} {problem}")]
+    Occupied {
+        /// Which end: `start` or `goal`.
+        end: &'static str,
+        /// The pose, what is wrong with it, and the nearest place with room.
+        problem: String,
+    },
+}
+
+impl QueryError {
+    /// A short name for programs, as in `GOAL_OCCUPIED`.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Outside { end: "goal", .. } => "GOAL_OUTSIDE_MAP",
+            Self::Outside { .. } => "START_OUTSIDE_MAP",
+            Self::Occupied { end: "goal", .. } => "GOAL_OCCUPIED",
+            Self::Occupied { .. } => "START_OCCUPIED",
+        }
+    }
+}
+
+impl Query {
+    /// Verifies that the robot of `world` can stand at both ends: at the start as it is turned there, at the goal in
+    /// some direction.
+    ///
+    /// # Errors
+    /// Says which end lies outside the map or leaves no room, and where the nearest room is.
+    pub fn check(&self, world: &World) -> Result<(), QueryError> {
+        let start = [self.start];
+        // The goal's heading is free. In steps of 0.1 rad a full turn has 63 headings.
+        let turned = |step: u32| self.goal.heading.radians() + f64::from(step) * 0.1;
+        let goal: Vec<Pose> = (0..63).map(|step| Pose::at(self.goal.position, turned(step).into())).collect();
+        check_end(world, "start", &start)?;
+        check_end(world, "goal", &goal)
+    }
+}
+
+/// Verifies that the robot fits in one of `poses`, all of which are in one place.
+fn check_end(world: &World, end: &'static str, poses: &[Pose]) -> Result<(), QueryError> {
+    let pose = &poses[0];
+    let frame = world.grid.frame();
+    let at = format!("({:.2}, {:.2}, {:.2})", pose.position.x, pose.position.y, pose.heading.radians());
+    let Some(cell) = frame.cell_at(pose.position) else {
+        let bounds = frame.bounds();
+        let problem = format!(
+            "{at} lies outside the map, which reaches from ({:.2}, {:.2}) to ({:.2}, {:.2})",
+            bounds.min.x, bounds.min.y, bounds.max.x, bounds.max.y
+        );
+        return Err(QueryError::Outside { end, problem });
+    };
+    if poses.iter().any(|&pose| world.geometry.is_free(pose)) {
+        return Ok(());
+    }
+    let what = match world.grid.get(cell) {
+        Occupancy::Occupied => "lies in an obstacle".to_owned(),
+        Occupancy::Unknown => "lies in unknown space (--unknown free takes it as free)".to_owned(),
+        Occupancy::Free => {
+            format!("is too near to an obstacle for the {}: its footprint overlaps", world.robot.name)
+        }
+    };
+    Err(QueryError::Occupied { end, problem: format!("{at} {what}; {}", nearest_room(world, pose)) })
+}
+
+/// Where the robot would fit.
+fn nearest_room(world: &World, pose: &Pose) -> String {
+    let frame = world.grid.frame();
+    let room_m = world.robot.footprint.circumscribed_radius_m() + 1.5 * frame.resolution_m;
+    let field = world.geometry.clearance();
+    let fits = (0..frame.len()).map(|index| frame.cell(index)).filter(|&cell| field.at(cell) > room_m);
+    let distance = |cell| (frame.center(cell) - pose.position).norm();
+    match fits.min_by(|&a, &b| distance(a).total_cmp(&distance(b))) {
+        Some(cell) => {
+            let point = frame.center(cell);
+            format!(
+                "the nearest place with room is ({:.2}, {:.2}), {:.2} m away",
+                point.x,
+                point.y,
+                distance(cell)
+            )
+        }
+        None => "the map has no place with room for it".to_owned(),
+    }
 }
 
 /// What the solver is busy with; a new phase ends the one before.

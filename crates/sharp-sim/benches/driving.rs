@@ -9,8 +9,8 @@ use std::sync::Arc;
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand::RngExt;
 use sharp_sim::{
-    ActionSettings, AnySim, NoiseModel, ObstacleMap, RobotModel, RobotState, Simulator, SimulatorKind,
-    Vehicle, WheelCommand,
+    ActionSettings, NoiseModel, ObstacleMap, RobotModel, RobotState, Simulator, SimulatorKind, Vehicle,
+    WheelCommand,
 };
 use sharp_space::{OccupancyGrid, Point, Pose, Seed, Stream};
 
@@ -29,8 +29,8 @@ fn grid(map: &str) -> OccupancyGrid {
     maps::map(map).expect("the benches know their maps")
 }
 
-fn simulator(kind: SimulatorKind, grid: &OccupancyGrid, robot: &RobotModel) -> AnySim {
-    let mut sim = AnySim::new(kind, Arc::new(ObstacleMap::new(grid, robot.footprint)), robot);
+fn simulator(kind: SimulatorKind, grid: &OccupancyGrid, robot: &RobotModel) -> Box<dyn Simulator> {
+    let mut sim = kind.build(Arc::new(ObstacleMap::new(grid, robot.footprint)), robot);
     sim.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)));
     sim
 }
@@ -75,7 +75,7 @@ fn pushes(c: &mut Criterion) {
 }
 
 /// Times steps on a circle of a metre, checked once to be clear.
-fn circle(c: &mut Criterion, name: &str, sim: &mut AnySim) {
+fn circle(c: &mut Criterion, name: &str, sim: &mut dyn Simulator) {
     let command = WheelCommand::Twist { speed_mps: 0.8, yaw_rate_radps: 1.0 };
     for _ in 0..1200 {
         assert!(!sim.step(command, DT_S).in_contact, "{name}: {:?}", sim.state());
@@ -102,7 +102,7 @@ fn actions(c: &mut Criterion) {
 }
 
 /// The next action around a square of five metres in the clear middle, on and on.
-fn act(vehicle: &mut Vehicle<AnySim>, action: &mut u64) -> f64 {
+fn act(vehicle: &mut Vehicle<Box<dyn Simulator>>, action: &mut u64) -> f64 {
     *action += 1;
     let (x, y) = [(2.4, 2.4), (-2.4, 2.4), (-2.4, -2.4), (2.4, -2.4)][*action as usize / 12 % 4];
     let report = vehicle.act(Point::new(x, y));

@@ -11,7 +11,7 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sharp_sim::{AnySim, ObstacleMap, RobotModel, RobotState, Simulator, SimulatorKind, WheelCommand};
+use sharp_sim::{ObstacleMap, RobotModel, RobotState, Simulator, SimulatorKind, WheelCommand};
 use sharp_space::{OccupancyGrid, Point, Pose, trig};
 
 #[path = "../benches/support/maps.rs"]
@@ -63,7 +63,7 @@ fn walls(grid: &OccupancyGrid) -> String {
 fn measure(grid: &OccupancyGrid, kind: SimulatorKind, time: Duration) -> String {
     let robot = RobotModel::husky();
     let mut circuit = Circuit {
-        sim: AnySim::new(kind, Arc::new(ObstacleMap::new(grid, robot.footprint)), &robot),
+        sim: kind.build(Arc::new(ObstacleMap::new(grid, robot.footprint)), &robot),
         hops: 0,
         left_m: HOP_M,
     };
@@ -84,7 +84,7 @@ fn measure(grid: &OccupancyGrid, kind: SimulatorKind, time: Duration) -> String 
 }
 
 /// Steps a second while the robot pushes a wall.
-fn measure_push(sim: &mut AnySim, time: Duration) -> f64 {
+fn measure_push(sim: &mut dyn Simulator, time: Duration) -> f64 {
     sim.reset(RobotState::at_rest(Pose::new(PUSH_FROM.0, PUSH_FROM.1, 0.0)));
     let command = WheelCommand::Twist { speed_mps: 1.0, yaw_rate_radps: 0.0 };
     for _ in 0..PUSH_STEPS {
@@ -109,7 +109,7 @@ fn repeat(time: Duration, mut step: impl FnMut()) -> (usize, f64) {
 
 /// A drive around the square.
 struct Circuit {
-    sim: AnySim,
+    sim: Box<dyn Simulator>,
     /// Waypoints reached.
     hops: usize,
     /// To the next one.

@@ -55,7 +55,7 @@ pub use planar::PlanarSim;
 #[cfg(feature = "rigid3d")]
 pub use rigid::RigidSim;
 pub use robot::{Drive, RobotError, RobotModel};
-pub use simulator::{AnySim, ForkSimulator, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
+pub use simulator::{ForkSimulator, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
 pub use state::{RobotState, WheelCommand};
 pub use vehicle::{ActionReport, ActionSettings, Vehicle, VehicleSnapshot};
 pub use wheels::approach;

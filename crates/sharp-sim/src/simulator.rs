@@ -141,65 +141,10 @@ impl fmt::Display for SimulatorKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Kinematic => "kinematic",
-            Self::Planar => "planar",
+            Self::Planar => "rapier2d",
             #[cfg(feature = "rigid3d")]
-            Self::Rigid => "rigid",
+            Self::Rigid => "rapier3d",
         })
-    }
-}
-
-/// A simulator chosen at run time.
-#[allow(clippy::large_enum_variant, reason = "a fork of the kinematic simulator must not allocate")]
-#[derive(Clone, Debug)]
-pub enum AnySim {
-    /// No engine.
-    Kinematic(KinematicSim),
-    /// A rigid-body engine; boxed, for it is large.
-    Planar(Box<PlanarSim>),
-    /// An engine with three dimensions; boxed, for it is large.
-    #[cfg(feature = "rigid3d")]
-    Rigid(Box<RigidSim>),
-}
-
-impl AnySim {
-    /// A simulator of the given kind, the robot at rest at the grid's origin.
-    #[must_use]
-    pub fn new(kind: SimulatorKind, map: Arc<ObstacleMap>, robot: &RobotModel) -> Self {
-        match kind {
-            SimulatorKind::Kinematic => Self::Kinematic(KinematicSim::new(map, robot)),
-            SimulatorKind::Planar => Self::Planar(Box::new(PlanarSim::new(map, robot))),
-            #[cfg(feature = "rigid3d")]
-            SimulatorKind::Rigid => Self::Rigid(Box::new(RigidSim::new(map, robot))),
-        }
-    }
-}
-
-impl Simulator for AnySim {
-    fn reset(&mut self, state: RobotState) {
-        match self {
-            Self::Kinematic(sim) => sim.reset(state),
-            Self::Planar(sim) => sim.reset(state),
-            #[cfg(feature = "rigid3d")]
-            Self::Rigid(sim) => sim.reset(state),
-        }
-    }
-
-    fn step(&mut self, command: WheelCommand, dt_s: f64) -> StepInfo {
-        match self {
-            Self::Kinematic(sim) => sim.step(command, dt_s),
-            Self::Planar(sim) => sim.step(command, dt_s),
-            #[cfg(feature = "rigid3d")]
-            Self::Rigid(sim) => sim.step(command, dt_s),
-        }
-    }
-
-    fn state(&self) -> &RobotState {
-        match self {
-            Self::Kinematic(sim) => sim.state(),
-            Self::Planar(sim) => sim.state(),
-            #[cfg(feature = "rigid3d")]
-            Self::Rigid(sim) => sim.state(),
-        }
     }
 }
 
@@ -209,7 +154,8 @@ mod tests {
 
     #[test]
     fn simulators_are_known_by_their_names() {
-        for (name, expected) in [("kinematic", "kinematic"), ("planar", "planar"), ("rapier2d", "planar")] {
+        for (name, expected) in [("kinematic", "kinematic"), ("planar", "rapier2d"), ("rapier2d", "rapier2d")]
+        {
             let kind = name.parse::<SimulatorKind>().map(|kind| kind.to_string());
             assert_eq!(kind.as_deref(), Ok(expected), "{name}");
         }
@@ -225,7 +171,7 @@ mod tests {
         let message = "simulator \"rapier3d\" is not compiled in, must be rapier2d or kinematic; \
             cargo build --release -p sharp-cli --features rigid3d adds it";
         match found.map_err(|error| error.to_string()) {
-            Ok(name) => assert_eq!((name.as_str(), cfg!(feature = "rigid3d")), ("rigid", true)),
+            Ok(name) => assert_eq!((name.as_str(), cfg!(feature = "rigid3d")), ("rapier3d", true)),
             Err(error) => assert_eq!((error.as_str(), cfg!(feature = "rigid3d")), (message, false)),
         }
     }

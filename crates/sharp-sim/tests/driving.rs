@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use sharp_sim::{
-    ActionSettings, AnySim, KinematicSim, NoiseModel, ObstacleMap, PlanarSim, RobotModel, RobotState,
-    Simulator, SimulatorKind, Vehicle, WheelCommand,
+    ActionSettings, KinematicSim, NoiseModel, ObstacleMap, PlanarSim, RobotModel, RobotState, Simulator,
+    SimulatorKind, Vehicle, WheelCommand,
 };
 use sharp_space::{GridFrame, Heading, Occupancy, OccupancyGrid, Point, Pose, Seed, Vector, trig};
 
@@ -42,8 +42,8 @@ fn clutter() -> OccupancyGrid {
     })
 }
 
-fn simulator(kind: SimulatorKind, grid: &OccupancyGrid, robot: &RobotModel) -> AnySim {
-    AnySim::new(kind, Arc::new(ObstacleMap::new(grid, robot.footprint)), robot)
+fn simulator(kind: SimulatorKind, grid: &OccupancyGrid, robot: &RobotModel) -> Box<dyn Simulator> {
+    kind.build(Arc::new(ObstacleMap::new(grid, robot.footprint)), robot)
 }
 
 fn vehicle(
@@ -51,7 +51,7 @@ fn vehicle(
     grid: &OccupancyGrid,
     robot: RobotModel,
     noise: NoiseModel,
-) -> Vehicle<AnySim> {
+) -> Vehicle<Box<dyn Simulator>> {
     let sim = simulator(kind, grid, &robot);
     Vehicle::new(sim, Arc::new(robot), noise, ActionSettings::default())
 }
@@ -204,7 +204,7 @@ fn a_robot_pushes_a_wall_and_backs_out() {
         for robot in [RobotModel::husky(), RobotModel::limo()] {
             let mut sim = simulator(kind, &grid, &robot);
             sim.reset(RobotState::at_rest(Pose::new(-0.5, 0.03, 0.0)));
-            let drive = |sim: &mut AnySim, speed_mps: f64, seconds: usize| {
+            let drive = |sim: &mut dyn Simulator, speed_mps: f64, seconds: usize| {
                 let command = WheelCommand::Twist { speed_mps, yaw_rate_radps: 0.0 };
                 (0..seconds * 60).map(|_| sim.step(command, DT_S).in_contact).last() == Some(true)
             };
@@ -264,7 +264,7 @@ fn both_robots_reach_eight_waypoints() {
             vehicle.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)), Seed(0), 0);
             for (x, y) in corners.into_iter().cycle().take(8) {
                 let waypoint = Point::new(x, y);
-                let away_m = |v: &Vehicle<AnySim>| (v.state().pose.position - waypoint).norm();
+                let away_m = |v: &Vehicle<Box<dyn Simulator>>| (v.state().pose.position - waypoint).norm();
                 let actions = (0..40)
                     .take_while(|_| {
                         vehicle.act(waypoint);
@@ -398,7 +398,7 @@ fn delayed_commands_arrive_later() {
 }
 
 /// Drives through the clutter under the worst noise and returns every state.
-fn episode(vehicle: &mut Vehicle<AnySim>, actions: u64) -> Vec<RobotState> {
+fn episode(vehicle: &mut Vehicle<Box<dyn Simulator>>, actions: u64) -> Vec<RobotState> {
     (0..actions)
         .map(|i| {
             let bearing = i as f64 * 2.4;
@@ -409,7 +409,7 @@ fn episode(vehicle: &mut Vehicle<AnySim>, actions: u64) -> Vec<RobotState> {
         .collect()
 }
 
-fn noisy(kind: SimulatorKind, robot: RobotModel) -> Vehicle<AnySim> {
+fn noisy(kind: SimulatorKind, robot: RobotModel) -> Vehicle<Box<dyn Simulator>> {
     let mut vehicle = vehicle(kind, &clutter(), robot, NoiseModel::biased());
     vehicle.reset(RobotState::at_rest(Pose::new(0.0, 0.0, 0.0)), Seed(5), 3);
     vehicle

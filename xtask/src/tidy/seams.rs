@@ -5,7 +5,7 @@ use super::code::{is_example, plain, words};
 use crate::tree::Tree;
 
 /// The traits, each with the crate that owns it.
-const SEAMS: [(&str, &str); 13] = [
+const SEAMS: [(&str, &str); 14] = [
     ("sharp-space", "CollisionChecker"),
     ("sharp-space", "RobotGeometry"),
     ("sharp-space", "RegionDetector"),
@@ -19,6 +19,7 @@ const SEAMS: [(&str, &str); 13] = [
     ("sharp-drive", "Policy"),
     ("sharp-plan", "OptionLearner"),
     ("sharp-bench", "Contender"),
+    ("sharp-bench", "Engine"),
 ];
 
 /// Longest example that implements a trait, lines: it shows that the trait is small.

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use serde::{Deserialize, Serialize};
+use sharp_bench::{Suite, SuiteSelection};
 
 use super::{Kind, Learning, Switch};
 
 #[derive(Debug, Args)]
 pub(crate) struct Eval {
     #[command(flatten)]
-    pub(crate) selection: SuiteSelection,
+    pub(crate) selection: SuiteArgs,
     /// Where results are written; a run that was stopped goes on where it was.
     #[arg(long, value_name = "DIR", default_value = "out/eval")]
     pub(crate) out: PathBuf,
@@ -18,8 +18,8 @@ pub(crate) struct Eval {
     #[arg(long, value_name = "FILE.jsonl")]
     pub(crate) baselines: Option<PathBuf>,
     /// Who does the jobs: threads of this process, or a Slurm cluster.
-    #[arg(long, value_enum, default_value_t = Engine::Local)]
-    pub(crate) engine: Engine,
+    #[arg(long, value_enum, default_value_t = EngineName::Local)]
+    pub(crate) engine: EngineName,
     /// Jobs at once of the local engine, each on one thread [default: as many as --threads].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) jobs: Option<u32>,
@@ -30,17 +30,17 @@ pub(crate) struct Eval {
 
 /// Who does the jobs of a suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Engine {
+pub(crate) enum EngineName {
     Local,
     Slurm,
 }
 
 /// A suite of problems, or a part of it.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct SuiteSelection {
+pub(crate) struct SuiteArgs {
     /// Which suite.
-    #[arg(value_enum, default_value_t = Suite::Smoke)]
-    pub(crate) suite: Suite,
+    #[arg(value_enum, default_value_t = SuiteName::Smoke)]
+    pub(crate) suite: SuiteName,
     /// Executions of each plan.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) episodes: u32,
@@ -85,7 +85,7 @@ pub(crate) struct SuiteSelection {
 
 /// Suites of problems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Suite {
+pub(crate) enum SuiteName {
     /// Environment a, Husky, both kinds of option, and the baselines that need no learning.
     Smoke,
     /// The same on every named environment for both robots.
@@ -95,8 +95,7 @@ pub(crate) enum Suite {
 }
 
 /// What a suite measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SystemName {
     /// This project.
     Sharp,
@@ -118,7 +117,7 @@ pub(crate) enum Jobs {
     /// Write DIR/manifest.jsonl: one line a job. Jobs that are planned already stay as they are.
     Plan {
         #[command(flatten)]
-        selection: SuiteSelection,
+        selection: SuiteArgs,
         /// The folder that all jobs share.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
@@ -162,4 +161,112 @@ pub(crate) struct Submit {
     /// What else sbatch is told, after `--`: partition, account, memory.
     #[arg(last = true, value_name = "SBATCH ARGS")]
     pub(crate) sbatch: Vec<String>,
+}
+
+impl From<SuiteName> for Suite {
+    fn from(name: SuiteName) -> Self {
+        match name {
+            SuiteName::Smoke => Self::Smoke,
+            SuiteName::Quick => Self::Quick,
+            SuiteName::Paper => Self::Paper,
+        }
+    }
+}
+
+impl SuiteArgs {
+    /// What the flags select; `seed` is the root of trial 0.
+    pub(crate) fn request(&self, seed: u64) -> SuiteSelection {
+        let mut selection = SuiteSelection::new(self.suite.into(), seed);
+        selection.episodes = self.episodes;
+        selection.learning = self.learning.iter().map(|learning| learning.name().to_owned()).collect();
+        selection.noise.clone_from(&self.noise);
+        selection.envs.clone_from(&self.envs);
+        selection.robots.clone_from(&self.robots);
+        selection.options = self.options.into_iter().map(Into::into).collect();
+        selection.regions.clone_from(&self.regions);
+        selection.problems.clone_from(&self.problems);
+        selection.systems = self.methods.iter().map(word).collect();
+        selection.trials = self.trials;
+        selection.recovery = self.recovery == Switch::On;
+        selection.cost_update = self.cost_update == Switch::On;
+        selection.time_limit_s = self.time_limit;
+        selection
+    }
+
+    /// The call of `sharp SUBCOMMAND` that asks for the same jobs.
+    pub(crate) fn command(&self, subcommand: &str, seed: u64) -> String {
+        let Self { suite, episodes, regions, time_limit, .. } = self;
+        let mut text = format!(
+            "sharp --seed {seed} {subcommand} {} --episodes {episodes} --noise {} --regions {regions} \
+             --recovery {} --cost-update {} --time-limit {time_limit}",
+            word(suite),
+            self.noise.join(","),
+            word(&self.recovery),
+            word(&self.cost_update),
+        );
+        let numbers =
+            |numbers: &[usize]| numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+        for (flag, value) in [
+            ("learning", words(&self.learning)),
+            ("envs", self.envs.join(",")),
+            ("robots", self.robots.join(",")),
+            ("options", words(self.options.as_slice())),
+            ("problems", numbers(&self.problems)),
+            ("methods", words(&self.methods)),
+            ("trials", self.trials.map_or_else(String::new, |trials| trials.to_string())),
+        ] {
+            if !value.is_empty() {
+                text += &format!(" --{flag} {value}");
+            }
+        }
+        text
+    }
+}
+
+fn words<T: ValueEnum>(values: &[T]) -> String {
+    values.iter().map(word).collect::<Vec<_>>().join(",")
+}
+
+/// How a value is typed.
+fn word<T: ValueEnum>(value: &T) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use sharp_bench::Experiment;
+
+    use super::*;
+    use crate::args::{Cli, Subcommands};
+
+    fn parse(text: &str) -> (SuiteArgs, u64) {
+        let cli = Cli::parse_from(text.split_whitespace());
+        let Subcommands::Eval(args) = cli.command else { panic!("{:?} is no evaluation", cli.command) };
+        (args.selection, cli.seed)
+    }
+
+    #[test]
+    fn the_call_of_a_job_says_everything_that_decides_it() {
+        let text = "sharp --seed 7 eval quick --episodes 50 --noise harsh,none --regions grid --recovery off \
+                    --cost-update on --time-limit 60 --learning fast,paper --envs a,b --options interface \
+                    --problems 1,3 --methods sharp,rrt-contact --trials 2";
+        let (args, seed) = parse(text);
+        assert_eq!(args.command("eval", seed), text);
+    }
+
+    #[test]
+    fn every_flag_reaches_the_experiments() {
+        let (args, seed) = parse(
+            "sharp --seed 7 eval quick --episodes 50 --noise harsh --regions grid --recovery off --time-limit 60 \
+             --learning prior --envs a --robots limo --options centroid --problems 1,3 --methods sharp,rrt-contact",
+        );
+        let experiments = args.request(seed).experiments().expect("jobs");
+        let names: Vec<String> = experiments.iter().map(Experiment::name).collect();
+        let begins = ["a-limo-centroid-prior-grid-no_recovery-harsh-t0-", "a-limo-rrt-contact-harsh-t0-"];
+        assert!(names.iter().zip(begins).all(|(name, begin)| name.starts_with(begin)), "{names:?}");
+        let first = &experiments[0];
+        assert_eq!((first.episodes, first.seed, first.time_limit_s), (50, 7, 60.0));
+        assert_eq!((experiments.len(), &*first.problems), (2, &[1, 3][..]));
+    }
 }

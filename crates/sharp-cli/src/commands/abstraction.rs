@@ -1,33 +1,48 @@
 //! `sharp abstract`: the abstraction of a map, as files, pictures and a route graph.
 
-use sharp_bench::SolveTimes;
+use serde::Serialize;
+use sharp_bench::{MapReport, SolveTimes, Stopwatch, TimedMonitor, named, pictures, prepare};
 use sharp_drive::World;
 use sharp_options::{OptionKind, OptionSet};
 use sharp_plan::write_atomic;
 
 use crate::args::Abstract;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::progress::{SolveMonitor, Stopwatch, spinner};
-use crate::report::{AbstractReport, MapReport};
-use crate::{geojson, input, pictures, pipeline};
+use crate::progress::{SolveMonitor, spinner};
+use crate::{geojson, input};
+
+/// `sharp.abstract/1`.
+#[derive(Debug, Serialize)]
+struct AbstractReport {
+    schema: &'static str,
+    map: MapReport,
+    robot: String,
+    regions: String,
+    states: usize,
+    neighbors: usize,
+    options_centroid: usize,
+    options_interface: usize,
+    covered: f64,
+    components: usize,
+    time_s: SolveTimes,
+}
 
 pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
-    let mut stopwatch = Stopwatch::start();
-    stopwatch.enter("load");
+    let stopwatch = Stopwatch::start("load");
     let map = input::map(&args.map)?;
-    let world = World::new(map.grid.clone(), input::robot(&args.abstraction.robot)?);
-    stopwatch.stop();
-    let monitor = SolveMonitor::new(stopwatch, None, spinner("building the abstraction"), None);
-    let (sharp, file) = pipeline::sharp(world, &args.abstraction, None, &monitor)?;
-    let (stopwatch, world) = (monitor.into_stopwatch(), sharp.world());
+    let world = World::new(map.grid.clone(), named::robot(&args.abstraction.robot)?);
+    let spinner = SolveMonitor::new(spinner("building the abstraction"), None);
+    let monitor = TimedMonitor::new(stopwatch, None, &spinner);
+    let (sharp, file) = prepare(world, &args.abstraction.request(), None, &monitor)?;
+    let (time_s, world) = (monitor.times(), sharp.world());
+    spinner.finish();
     let abstraction = file.abstraction();
     let count = |kind| OptionSet::synthesize(&file.rbvd, kind, &file.options).options().len();
 
     file.save(&args.out.join("abstraction.ron"))?;
-    let heatmap = sharp.detection().and_then(|found| pipeline::heatmap(map.grid.frame(), found));
-    if let Some(heatmap) = &heatmap {
+    if let Some(criticality) = sharp.detection().and_then(|found| found.criticality.as_deref()) {
         let regions = pictures::regions_of(&file.rbvd);
-        pictures::write(&args.out, "regions", &pictures::regions(&map.grid, heatmap, &regions))?;
+        pictures::write(&args.out, "regions", &pictures::regions(&map.grid, criticality, &regions))?;
     }
     pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
     let route = geojson::route(&abstraction, world.robot.max_speed_mps);
@@ -45,7 +60,7 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
         options_interface: count(OptionKind::Interface),
         covered: rbvd.covered_share(),
         components: rbvd.component_count(),
-        time_s: SolveTimes::from(&stopwatch),
+        time_s,
     };
     if json {
         say!("{}", to_json(&report));

@@ -1,92 +1,43 @@
 //! `sharp baseline`: the systems to compare with, on the same map, robot, noise and simulator.
 
-use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
-use serde::Serialize;
 use sharp_bench::{
-    ComparisonSettings, Contender as System, DecisionTimes, Driven, FlatSac, Mpc, RoutePlanner, Rrt,
-    SacBudget, Track, compare,
+    BaselineKind, BaselineReport, BaselineSettings, BaselineTimes, CurveFolder, MeasureMonitor, NamedProblem,
+    Stopwatch, measure,
 };
-use sharp_drive::{EpisodeEnd, MppiSettings, ProfiledFollower, SuccessCount, Supervisor, World};
-use sharp_motion::{Budget, RrtSettings};
-use sharp_plan::{Conditions, Query};
 use sharp_rl::Progress;
-use sharp_sim::NoiseModel;
-use sharp_space::Seed;
 
-use crate::args::{Baseline, BaselineName, Collisions};
-use crate::curves::CurveFolder;
+use crate::args::{Baseline, Collisions};
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::progress::{Stopwatch, is_interrupted, spinner};
-use crate::report::MapReport;
-
-/// Wall time that the paper gives its baselines, seconds.
-const TIME_LIMIT_S: f64 = 2400.0;
-/// Longest crossing of a flat policy where no path tells, simulated seconds.
-const HORIZON_S: f64 = 300.0;
-
-/// Wall time by phase, seconds. `plan` and `learn` are what one execution needs before and while it
-/// drives; `drive` is what simulating all of them took, their planning included.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(crate) struct BaselineTimes {
-    pub(crate) load: f64,
-    pub(crate) plan: f64,
-    pub(crate) learn: f64,
-    pub(crate) drive: f64,
-    pub(crate) total: f64,
-}
-
-/// `sharp.baseline/1`.
-#[derive(Debug, Serialize)]
-pub(crate) struct BaselineReport {
-    pub(crate) schema: &'static str,
-    pub(crate) method: &'static str,
-    pub(crate) status: &'static str,
-    pub(crate) robot: String,
-    pub(crate) noise: String,
-    pub(crate) simulator: String,
-    pub(crate) seed: u64,
-    pub(crate) map: MapReport,
-    pub(crate) episodes: u32,
-    pub(crate) successes: u32,
-    pub(crate) success_rate: f64,
-    pub(crate) lower95: f64,
-    pub(crate) upper95: f64,
-    pub(crate) collisions: u32,
-    pub(crate) timeouts: u32,
-    pub(crate) strays: u32,
-    pub(crate) recoveries: u32,
-    pub(crate) mean_sim_time_s: f64,
-    pub(crate) mean_path_m: f64,
-    pub(crate) env_steps: u64,
-    pub(crate) gradient_steps: u64,
-    pub(crate) decision_us: DecisionTimes,
-    pub(crate) time_s: BaselineTimes,
-}
-
-/// The problem with everything around it.
-struct Bench<'a> {
-    args: &'a Baseline,
-    world: World,
-    query: Query,
-    settings: ComparisonSettings,
-    seed: Seed,
-}
-
-/// What preparing and driving gave.
-#[derive(Default)]
-struct Measured {
-    driven: Vec<Driven>,
-    env_steps: u64,
-    gradient_steps: u64,
-}
+use crate::progress::{is_interrupted, spinner, warn_of_curves};
 
 pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let bar = spinner(args.system.name());
-    let report = measure(args, seed)?;
+    let stopwatch = Stopwatch::start("load");
+    let kind = BaselineKind::from(args.system);
+    let mut settings = BaselineSettings::new(kind, args.episodes, seed);
+    settings.simulator = input::simulator(&args.simulator)?;
+    settings.contact_ends = args.collisions == Collisions::End;
+    settings.rrt_samples = args.rrt_samples;
+    settings.max_env_steps = args.max_env_steps;
+    if let Some(seconds) = args.time_limit {
+        settings.time_limit = Some(Duration::try_from_secs_f64(seconds).map_err(|_| {
+            Failure::new(
+                "USAGE",
+                format!("--time-limit is {seconds}, expected a number of seconds from 0 on"),
+            )
+        })?);
+    }
+    let map = input::map(&args.map)?;
+    let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
+    let problem = NamedProblem::new(&map, query, &args.robot, &args.noise)?;
+    let bar = spinner(kind.name());
+    let monitor = CurveMonitor(args.tensorboard.as_deref().map(|root| Mutex::new(CurveFolder::new(root))));
+    let report = measure(&problem, &settings, stopwatch, &monitor)?;
     bar.finish_and_clear();
+    warn_of_curves(monitor.0);
     if json {
         say!("{}", to_json(&report));
     } else {
@@ -99,195 +50,19 @@ pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failur
     })
 }
 
-/// Prepares the system, drives and counts; prints nothing. After an interrupt the counts are those so far.
-pub(crate) fn measure(args: &Baseline, seed: u64) -> Result<BaselineReport, Failure> {
-    let mut stopwatch = Stopwatch::start();
-    stopwatch.enter("load");
-    let limit_s = args.time_limit.unwrap_or(TIME_LIMIT_S);
-    let limit = Duration::try_from_secs_f64(limit_s).map_err(|_| {
-        Failure::new("USAGE", format!("--time-limit is {limit_s}, expected a number of seconds from 0 on"))
-    })?;
-    let deadline = Instant::now().checked_add(limit);
-    let map = input::map(&args.map)?;
-    let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
-    let noise = input::noise(&args.noise)?;
-    let world = World::new(map.grid.clone(), input::robot(&args.robot)?);
-    input::check_query(&world, &query)?;
-    let settings = comparison(args, &world, noise, seed)?;
-    let bench = Bench { args, world, query, settings, seed: Seed(seed).child("baseline", 0) };
-    let stop = || is_interrupted() || deadline.is_some_and(|deadline| Instant::now() >= deadline);
-    let measured = bench.measure(&mut stopwatch, &stop)?;
-    Ok(bench.report(seed, MapReport::new(&map.name, &map.grid), measured.as_ref(), &stopwatch))
-}
+/// Draws learning curves, if they are wanted, and stops when the user does.
+struct CurveMonitor(Option<Mutex<CurveFolder>>);
 
-fn comparison(
-    args: &Baseline,
-    world: &World,
-    noise: NoiseModel,
-    seed: u64,
-) -> Result<ComparisonSettings, Failure> {
-    let simulator = world.simulator(input::simulator(&args.simulator)?);
-    Ok(ComparisonSettings {
-        episodes: args.episodes,
-        simulator,
-        noise,
-        contact_ends: args.collisions == Collisions::End,
-        // The noise of `sharp run --seed`: what is compared meets the same luck.
-        seed: Seed(seed),
-    })
-}
-
-impl Bench<'_> {
-    /// Prepares the system and lets it drive; `None` if no path leads to the goal.
-    fn measure(
-        &self,
-        stopwatch: &mut Stopwatch,
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Option<Measured>, Failure> {
-        let Self { args, world, query, seed, .. } = self;
-        stopwatch.enter("plan");
-        let planner = RoutePlanner::new(world, query.goal);
-        if args.system == BaselineName::Rrt {
-            let budget = Budget { iterations: args.rrt_samples };
-            let settings = RrtSettings { budget, ..RrtSettings::default() };
-            let rrt = Rrt {
-                world,
-                planner: &planner,
-                query: *query,
-                settings,
-                contact_ends: self.settings.contact_ends,
-                seed: *seed,
-            };
-            return Ok(Some(self.drive(&rrt, stopwatch, stop)));
-        }
-        let route = planner.plan_from(query.start);
-        stopwatch.stop();
-        if args.system == BaselineName::Sac {
-            let length_s = route.map(|route| 6.0 * route.length_m() / world.robot.max_speed_mps);
-            return self.learn(length_s.unwrap_or(HORIZON_S).max(60.0), stopwatch, stop).map(Some);
-        }
-        let Some(route) = route else { return Ok(None) };
-        let (robot, noise) = (&world.robot, self.settings.noise.clone());
-        Ok(Some(if args.system == BaselineName::Track {
-            self.drive(
-                &Track {
-                    world,
-                    planner: &planner,
-                    query: *query,
-                    route,
-                    follower: ProfiledFollower::tuned(robot, &noise),
-                    noise,
-                },
-                stopwatch,
-                stop,
-            )
-        } else {
-            let settings = MppiSettings::new(robot, &noise);
-            self.drive(
-                &Mpc { world, planner: &planner, query: *query, route, settings, noise, seed: *seed },
-                stopwatch,
-                stop,
-            )
-        }))
-    }
-
-    fn learn(
-        &self,
-        horizon_s: f64,
-        stopwatch: &mut Stopwatch,
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Measured, Failure> {
-        stopwatch.enter("learn");
-        let budget = SacBudget { max_env_steps: self.args.max_env_steps, horizon_s };
-        let mut curves = self.args.tensorboard.as_deref().map(CurveFolder::new);
-        let mut observer = |progress: &Progress<'_>| {
-            if let Some(curves) = &mut curves {
-                curves.note("sac", progress);
-            }
-            if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let conditions = Conditions::new(&self.world, self.settings.noise.clone());
-        let learnt = FlatSac::learn(&self.world, self.query, (&conditions, self.seed), budget, &mut observer)
-            .map_err(|error| Failure::from(anyhow::Error::from(error)))?;
-        // The limit is for learning: what was learnt is driven in any case.
-        let driven = self.drive(&learnt, stopwatch, &is_interrupted);
-        Ok(Measured { env_steps: learnt.env_steps(), gradient_steps: learnt.gradient_steps(), ..driven })
-    }
-
-    fn drive(
-        &self,
-        system: &dyn System,
-        stopwatch: &mut Stopwatch,
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Measured {
-        stopwatch.enter("drive");
-        let begun = Instant::now();
-        let clock_us = || begun.elapsed().as_secs_f64() * 1e6;
-        let supervisor = Supervisor { clock_us: &clock_us, should_stop: stop };
-        let driven = compare(system, &self.world, &self.query, &self.settings, &supervisor);
-        stopwatch.stop();
-        Measured { driven, ..Measured::default() }
-    }
-
-    fn report(
-        &self,
-        seed: u64,
-        map: MapReport,
-        measured: Option<&Measured>,
-        watch: &Stopwatch,
-    ) -> BaselineReport {
-        let nothing = Measured::default();
-        let Measured { driven, env_steps, gradient_steps } = measured.unwrap_or(&nothing);
-        let ended = |end: EpisodeEnd| driven.iter().filter(|one| one.end == end).count() as u32;
-        let tally = SuccessCount { episodes: self.args.episodes, successes: ended(EpisodeEnd::Reached) };
-        let mean = |of: fn(&Driven) -> f64| {
-            let reached = driven.iter().filter(|one| one.end == EpisodeEnd::Reached);
-            reached.map(of).fold(0.0, |sum, value| sum + value) / f64::from(tally.successes.max(1))
-        };
-        let planning_us =
-            driven.iter().map(|one| one.record.planning_us).sum::<f64>() / driven.len().max(1) as f64;
-        BaselineReport {
-            schema: "sharp.baseline/1",
-            method: self.args.system.name(),
-            status: if measured.is_some() { "driven" } else { "no_plan" },
-            robot: self.world.robot.name.clone(),
-            noise: self.args.noise.clone(),
-            simulator: self.args.simulator.clone(),
-            seed,
-            map,
-            episodes: tally.episodes,
-            successes: tally.successes,
-            success_rate: tally.rate(),
-            lower95: tally.lower95(),
-            upper95: tally.upper95(),
-            collisions: driven.iter().map(|one| one.record.contacts).sum(),
-            timeouts: ended(EpisodeEnd::TimedOut) + ended(EpisodeEnd::Lost),
-            strays: 0,
-            recoveries: driven.iter().map(Driven::replans).sum(),
-            mean_sim_time_s: mean(|one| one.record.time_s),
-            mean_path_m: mean(|one| one.record.path_m),
-            env_steps: *env_steps,
-            gradient_steps: *gradient_steps,
-            decision_us: decision_times(driven),
-            time_s: BaselineTimes {
-                load: watch.spent_s("load"),
-                plan: watch.spent_s("plan") + 1e-6 * planning_us,
-                learn: watch.spent_s("learn"),
-                drive: watch.spent_s("drive"),
-                total: watch.total_s(),
-            },
+impl MeasureMonitor for CurveMonitor {
+    fn trained(&self, progress: &Progress<'_>) {
+        if let Some(curves) = &self.0 {
+            curves.lock().unwrap_or_else(PoisonError::into_inner).note("sac", progress);
         }
     }
-}
 
-fn decision_times(driven: &[Driven]) -> DecisionTimes {
-    let mut times: Vec<f64> = driven.iter().flat_map(|one| one.record.decisions_us.iter().copied()).collect();
-    times.sort_by(f64::total_cmp);
-    let quantile = |q: f64| {
-        let last = times.len().saturating_sub(1);
-        times.get(((times.len() as f64 * q) as usize).min(last)).copied().unwrap_or(0.0)
-    };
-    DecisionTimes { p50: quantile(0.5), p99: quantile(0.99) }
+    fn should_stop(&self) -> bool {
+        is_interrupted()
+    }
 }
 
 fn print_report(report: &BaselineReport) {

@@ -3,12 +3,15 @@
 use std::ops::Range;
 use std::path::Path;
 
-use sharp_bench::{ResultLine, row_text};
+use sharp_bench::{
+    Ended, EngineMonitor, Manifest, ResultLine, SlurmScripts, Submission, clean, merge, row_text, run_job,
+    unfinished,
+};
 
-use crate::args::{Jobs, Submit, SuiteSelection};
-use crate::commands::eval::write_report;
-use crate::jobs::{Cluster, Ended, Manifest, Submission, clean, command, merge, run_job, specs, unfinished};
+use crate::args::{Jobs, Submit, SuiteArgs};
+use crate::commands::eval::{program, write_report};
 use crate::outcome::{Exit, Failure, say, to_json};
+use crate::progress::is_interrupted;
 
 pub(crate) fn run(jobs: &Jobs, seed: u64, json: bool) -> Result<Exit, Failure> {
     match jobs {
@@ -19,9 +22,9 @@ pub(crate) fn run(jobs: &Jobs, seed: u64, json: bool) -> Result<Exit, Failure> {
     }
 }
 
-fn plan(selection: &SuiteSelection, out: &Path, seed: u64) -> Result<Exit, Failure> {
-    let command = command("jobs plan", selection, seed) + &format!(" --out {}", out.display());
-    let (manifest, indices) = Manifest::extend(out, specs(selection, seed)?, &command)?;
+fn plan(selection: &SuiteArgs, out: &Path, seed: u64) -> Result<Exit, Failure> {
+    let command = selection.command("jobs plan", seed) + &format!(" --out {}", out.display());
+    let (manifest, indices) = Manifest::extend(out, selection.request(seed).experiments()?, &command)?;
     let weight_s: f64 = indices.iter().map(|&index| manifest.jobs[index].weight_s).sum();
     say!(
         "{} jobs planned in {}; the {} asked for take about {:.0} minutes of processor time",
@@ -38,26 +41,39 @@ fn run_block(dir: &Path, index: Option<&str>, json: bool) -> Result<Exit, Failur
     let manifest = Manifest::open(dir)?;
     let block = block(index)?;
     let is_alone = block.len() == 1;
-    let show = |line: &ResultLine| {
-        if json {
-            say!("{}", to_json(line));
-        } else {
-            say!("{}", row_text(line));
-        }
-    };
+    let monitor = ResultPrinter { json };
     let mut exit = Exit::Done;
     for index in block {
-        match run_job(dir, manifest.job(index)?, &show) {
+        match run_job(&manifest, index, &monitor) {
             Ok(Ended::Done) => {}
             Ok(Ended::Interrupted) => return Ok(interrupted()),
-            Err(failure) if is_alone => return Err(failure),
-            Err(failure) => {
-                eprintln!("error: {failure}");
+            Err(error) if is_alone => return Err(error.into()),
+            Err(error) => {
+                eprintln!("error: {error}");
                 exit = Exit::Partial;
             }
         }
     }
     Ok(exit)
+}
+
+/// Prints each result.
+struct ResultPrinter {
+    json: bool,
+}
+
+impl EngineMonitor for ResultPrinter {
+    fn result(&self, line: &ResultLine) {
+        if self.json {
+            say!("{}", to_json(line));
+        } else {
+            say!("{}", row_text(line));
+        }
+    }
+
+    fn should_stop(&self) -> bool {
+        is_interrupted()
+    }
 }
 
 /// What is kept waits for the next start: on Slurm that comes by itself after this code.
@@ -90,8 +106,8 @@ fn parse_block(text: &str) -> Option<Range<usize>> {
 fn merge_all(dir: &Path) -> Result<Exit, Failure> {
     let manifest = Manifest::open(dir)?;
     let merged = merge(&manifest)?;
-    for (_, failure) in &merged.missing {
-        eprintln!("error: {failure}");
+    for (_, error) in &merged.missing {
+        eprintln!("error: {error}");
     }
     let page = write_report(&manifest, &merged, &[])?;
     say!(
@@ -123,7 +139,7 @@ fn submit(args: &Submit) -> Result<Exit, Failure> {
         pack_s: 60.0 * pack,
         sbatch: sbatch.clone(),
     };
-    let cluster = Cluster::write(&manifest, &indices, &submission)?;
+    let cluster = SlurmScripts::write(&program()?, &manifest, &indices, &submission)?;
     if *dry_run {
         for script in [&cluster.array, &cluster.merge] {
             let text = std::fs::read_to_string(script).unwrap_or_default();

@@ -1,6 +1,7 @@
 //! `sharp map info|check`: what a map file says, and whether a robot has room in it.
 
 use serde::Serialize;
+use sharp_bench::MapReport;
 use sharp_drive::World;
 use sharp_plan::AbstractionSettings;
 use sharp_rbvd::Rbvd;
@@ -9,7 +10,6 @@ use sharp_space::Occupancy;
 use crate::args::Map;
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::report::MapReport;
 
 #[derive(Serialize)]
 struct Info {
@@ -79,7 +79,7 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
         }
         Map::Check { map, robot } => {
             let map = input::map(map)?;
-            let world = World::new(map.grid, input::robot(robot)?);
+            let world = World::new(map.grid, sharp_bench::named::robot(robot)?);
             let rbvd = AbstractionSettings::new(&world).diagram(&world, &[]).ok();
             let check = Check {
                 schema: "sharp.map.check/1",

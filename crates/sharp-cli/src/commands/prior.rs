@@ -9,6 +9,7 @@ use std::time::Instant;
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
+use sharp_bench::{CurveFolder, named};
 use sharp_drive::{Follower, OptionPolicy, OptionTask, Prior, ProfiledFollower, SuccessEstimate, World};
 use sharp_maps::{FloorplanKind, generate};
 use sharp_options::OptionKind;
@@ -22,9 +23,8 @@ use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{GridFrame, OccupancyGrid, Pose, Seed, Stream};
 
 use crate::args::{PriorCommand, PriorScore, PriorTrain};
-use crate::curves::CurveFolder;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::{input, progress};
+use crate::progress;
 
 /// Side of the maps, metres.
 const MAP_M: f64 = 15.0;
@@ -98,7 +98,7 @@ pub(crate) fn run(command: &PriorCommand, seed: u64, json: bool) -> Result<Exit,
 
 fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> {
     let begun = Instant::now();
-    let robot = input::robot(&args.robot)?;
+    let robot = named::robot(&args.robot)?;
     let kinds: Vec<_> = FloorplanKind::ALL.into_iter().filter(|kind| !HELD_OUT.contains(kind)).collect();
     let bar = progress::bar(u64::from(args.maps), "planning courses");
     let courses = Arc::new(courses(&robot, &kinds, args.maps, Seed(seed).child("prior", 0), &bar)?);
@@ -269,8 +269,8 @@ fn place(world: &World, rng: &mut Stream) -> Option<Pose> {
 }
 
 fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let robot = input::robot(&args.robot)?;
-    let noise = input::noise(&args.noise)?;
+    let robot = named::robot(&args.robot)?;
+    let noise = named::noise(&args.noise)?;
     let bar = progress::bar(u64::from(args.maps), "planning courses");
     let courses = courses(&robot, &HELD_OUT, args.maps, Seed(seed).child("prior score", 0), &bar)?;
     bar.finish_and_clear();

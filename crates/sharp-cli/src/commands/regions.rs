@@ -1,6 +1,7 @@
 //! `sharp regions train|predict|score`: the predictor of critical regions.
 
 use serde::Serialize;
+use sharp_bench::{named, pictures};
 use sharp_drive::World;
 use sharp_motion::Steering;
 use sharp_plan::write_atomic;
@@ -10,8 +11,8 @@ use sharp_space::Region;
 
 use crate::args::{Abstract, Regions};
 use crate::commands::{regions_score, regions_train};
+use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::{input, pictures, pipeline};
 
 #[derive(Serialize)]
 struct PredictReport {
@@ -44,10 +45,11 @@ pub(crate) fn label_robot(robot: &RobotModel) -> LabelRobot {
 
 fn predict(args: &Abstract, json: bool) -> Result<Exit, Failure> {
     let map = input::map(&args.map)?;
-    let world = World::new(map.grid, input::robot(&args.abstraction.robot)?);
-    let found = pipeline::detect(&world, &args.abstraction.regions)?;
-    if let Some(heatmap) = pipeline::heatmap(world.grid.frame(), &found) {
-        let picture = pictures::regions(&world.grid, &heatmap, &found.regions);
+    let world = World::new(map.grid, named::robot(&args.abstraction.robot)?);
+    let detector = named::detector(&world, &args.abstraction.regions)?;
+    let found = detector.detect(&world.grid, &world.robot.footprint);
+    if let Some(criticality) = &found.criticality {
+        let picture = pictures::regions(&world.grid, criticality, &found.regions);
         pictures::write(&args.out, "regions", &picture)?;
     }
     let report = PredictReport {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde::Serialize;
+use sharp_bench::named;
 use sharp_drive::World;
 use sharp_maps::FloorplanKind;
 use sharp_maps::load_doors;
@@ -17,7 +18,7 @@ use sharp_space::{Detection, DistanceField, OccupancyGrid, Point, Region, Seed};
 use crate::args::{MapArgs, RegionsScore, Unknown};
 use crate::commands::regions::label_robot;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::{input, pipeline, progress};
+use crate::{input, progress};
 
 /// Thresholds that calibration tries.
 const THRESHOLDS: [f64; 7] = [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
@@ -64,13 +65,13 @@ struct ThresholdReport {
 }
 
 pub(crate) fn run(args: &RegionsScore, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let robot = input::robot(&args.robot)?;
+    let robot = named::robot(&args.robot)?;
     if let (Some(map), Some(doors)) = (&args.map, &args.doors) {
         return at_doors(args, robot, map, doors, json);
     }
     let predictor = match &args.model {
         Some(file) => model(file)?,
-        None => pipeline::shipped(&robot),
+        None => RegionPredictor::shipped_for(&robot.footprint),
     };
     if args.calibrate {
         return calibrate(args, &robot, &predictor, seed, json);
@@ -216,7 +217,8 @@ fn at_doors(
     let (regions, source) = match &args.model {
         Some(file) => (with_model(&world, &model(file)?), file.display().to_string()),
         None => {
-            let Detection { regions, source, .. } = pipeline::detect(&world, &args.regions)?;
+            let Detection { regions, source, .. } =
+                named::detector(&world, &args.regions)?.detect(&world.grid, &world.robot.footprint);
             (regions, source)
         }
     };

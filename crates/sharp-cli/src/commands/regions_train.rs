@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use indicatif::ProgressBar;
 use serde::Serialize;
+use sharp_bench::{EventFile, named, pictures};
 use sharp_draw::svg_to_png;
 use sharp_maps::generate;
 use sharp_plan::write_atomic;
@@ -18,8 +19,7 @@ use sharp_space::{OccupancyGrid, Seed};
 use crate::args::RegionsTrain;
 use crate::commands::regions::label_robot;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::tensorboard::EventFile;
-use crate::{input, pictures, progress};
+use crate::progress;
 
 /// Side of a sample picture, pixels.
 const SAMPLE_PX: u32 = 440;
@@ -48,7 +48,7 @@ struct RegionTrainTimes {
 }
 
 pub(crate) fn run(args: &RegionsTrain, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let robot = input::robot(&args.robot)?;
+    let robot = named::robot(&args.robot)?;
     let settings = settings(args, seed)?;
     let work = args.out.with_extension("work");
     let label_robot = label_robot(&robot);
@@ -190,7 +190,7 @@ impl<'a> Watch<'a> {
     fn draw(&mut self, step: usize, predictor: &RegionPredictor) -> Result<(), Failure> {
         let settings = RegionSettings::default();
         let found = predict_regions(&self.sample, &self.robot.footprint, predictor, &settings);
-        let svg = pictures::regions(&self.sample, &found.heatmap, &found.regions);
+        let svg = pictures::regions(&self.sample, found.heatmap.values(), &found.regions);
         let png = svg_to_png(&svg, SAMPLE_PX)?;
         write_atomic(&self.work.join("samples").join(format!("step-{step:06}.png")), &png)?;
         self.events

@@ -2,16 +2,15 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
+use sharp_bench::{RunReport, clock_us, named, pictures};
 use sharp_maps::{LoadOptions, load};
 use sharp_plan::{Plan, RunSettings, run as run_plan, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{Collisions, Run, Switch};
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::report::RunReport;
-use crate::{input, pictures, progress};
+use crate::{input, progress};
 
 pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     let simulator = input::simulator(&args.simulator)?;
@@ -19,14 +18,13 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     let mut settings = RunSettings::new(&plan, args.episodes, Seed(seed));
     settings.simulator = plan.world.simulator(simulator);
     if let Some(noise) = &args.noise {
-        settings.noise = input::noise(noise)?;
+        settings.noise = named::noise(noise)?;
     }
     settings.recovery = args.recovery == Switch::On;
     settings.contact_ends = args.collisions == Collisions::End;
 
     let spinner = progress::spinner("driving");
-    let begun = Instant::now();
-    let episodes = run_plan(&plan, &settings, &|| begun.elapsed().as_secs_f64() * 1e6);
+    let episodes = run_plan(&plan, &settings, &clock_us());
     spinner.finish_and_clear();
     let report = RunReport::new(&plan, &episodes);
     let picture = pictures::plan(&plan, &plan.solution.query, &episodes);

@@ -3,43 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use indicatif::ProgressBar;
-use sharp_bench::{Reuse, SolveTimes};
-use sharp_drive::World;
-use sharp_maps::MapFile;
-use sharp_plan::{AbstractionFile, Answer, Method, Plan, Sharp, write_atomic};
-use sharp_space::Seed;
+use sharp_bench::{NamedProblem, SolveReport, SolveSettings, Stopwatch, TimedMonitor, solve};
+use sharp_plan::Method;
 
-use crate::args::{Guide, Learning, Solve, Switch};
+use crate::args::{Guide, Solve, Switch};
+use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::progress::{SolveMonitor, Stopwatch, is_interrupted, spinner};
-use crate::report::{MapReport, SolveReport};
-use crate::{input, pictures, pipeline};
-
-/// What solving gave: the report, and the plan if there is one.
-pub(crate) struct Solved {
-    pub(crate) report: SolveReport,
-    pub(crate) plan: Option<Plan>,
-}
+use crate::progress::{SolveMonitor, is_interrupted, spinner};
 
 pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> {
-    let Solved { report, plan } = solve_problem(args, seed, spinner("searching"))?;
-    if json {
-        say!("{}", to_json(&report));
-    } else {
-        print_report(&report);
-    }
-    Ok(match plan {
-        Some(_) => Exit::Done,
-        None if is_interrupted() => Exit::Interrupted,
-        None => Exit::No,
-    })
-}
-
-/// Solves and writes the plan folder; shows on `spinner` what it does and prints nothing.
-pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Result<Solved, Failure> {
-    let mut stopwatch = Stopwatch::start();
-    stopwatch.enter("load");
+    let stopwatch = Stopwatch::start("load");
     let time_limit = args.time_limit.map(limit).transpose()?;
     if !(args.failure_cost.is_finite() && args.failure_cost >= 0.0) {
         let message = format!("--failure-cost is {}, expected seconds, 0 or more", args.failure_cost);
@@ -47,55 +20,36 @@ pub(crate) fn solve_problem(args: &Solve, seed: u64, spinner: ProgressBar) -> Re
     }
     let map = input::map(&args.map)?;
     let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
-    let noise = input::noise(&args.noise)?;
-    let robot = input::robot(&args.abstraction.robot)?;
-    let simulator = input::simulator(&args.simulator)?;
-    let world = World::new(map.grid.clone(), robot);
-    input::check_query(&world, &query)?;
-    args.out.as_deref().map_or(Ok(()), input::check_out)?;
-    let mut library = pipeline::library(args.library.as_deref(), &world, (simulator, &noise), args.learning)?;
-    // Hours of training are kept at once; they are the same whatever else the library holds.
-    if args.learning != Learning::Paper {
-        library.defer();
-    }
-    stopwatch.stop();
-
-    let monitor = SolveMonitor::new(stopwatch, time_limit, spinner, args.tensorboard.as_deref());
-    let cache = library.folder().map(Path::to_owned);
-    let (sharp, file) = pipeline::sharp(world, &args.abstraction, cache.as_deref(), &monitor)?;
-    let simulator = sharp.world().simulator(simulator);
-    let mut sharp = sharp
-        .with_method(method(args))
-        .with_noise(noise)
-        .with_simulator(simulator)
-        .with_library(library)
-        .with_seed(Seed(seed));
-    let answer = sharp.solve(query, &monitor)?;
-    let stopwatch = monitor.into_stopwatch();
-
-    let report = blank_report(args, seed, &map, &mut sharp, &file)?;
-    let (mut report, plan) = match answer {
-        Answer::Solved(plan) => {
-            let folder = plan_folder(args, &map, &plan.world)?;
-            let report = report.with_plan(&plan, &folder);
-            (report, Some((*plan, folder)))
-        }
-        Answer::NoPlan(reason) => (SolveReport { status: "no_plan", reason: Some(reason), ..report }, None),
-        Answer::Stopped => (
-            SolveReport {
-                status: "timeout",
-                reason: Some("stopped before a plan was verified; what was learnt is kept".to_owned()),
-                ..report
-            },
-            None,
-        ),
+    let problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
+    let settings = SolveSettings {
+        abstraction: args.abstraction.request(),
+        method: method(args),
+        simulator: input::simulator(&args.simulator)?,
+        seed,
     };
-    report.time_s = SolveTimes::from(&stopwatch);
-    let plan = plan
-        .map(|(plan, folder)| write_plan(&plan, &folder, (&sharp, &file), &report).map(|()| plan))
-        .transpose()?;
-    sharp.library_mut().save()?;
-    Ok(Solved { report, plan })
+    args.out.as_deref().map_or(Ok(()), input::check_out)?;
+    let library = input::library(args.library.as_deref());
+
+    let spinner = SolveMonitor::new(spinner("searching"), args.tensorboard.as_deref());
+    let monitor = TimedMonitor::new(stopwatch, time_limit, &spinner);
+    let mut solved = solve(&problem, &settings, library.as_deref(), &monitor)?;
+    spinner.finish();
+
+    if solved.plan.is_some() {
+        let folder = plan_folder(args, &problem)?;
+        solved.write(&folder, &folder)?;
+    }
+    solved.save_library()?;
+    if json {
+        say!("{}", to_json(&solved.report));
+    } else {
+        print_report(&solved.report);
+    }
+    Ok(match solved.plan {
+        Some(_) => Exit::Done,
+        None if is_interrupted() => Exit::Interrupted,
+        None => Exit::No,
+    })
 }
 
 fn limit(seconds: f64) -> Result<Duration, Failure> {
@@ -113,71 +67,19 @@ fn method(args: &Solve) -> Method {
     if args.guide == Guide::Paper { method.with_learn_and_link() } else { method }
 }
 
-fn blank_report(
-    args: &Solve,
-    seed: u64,
-    map: &MapFile,
-    sharp: &mut Sharp,
-    file: &AbstractionFile,
-) -> Result<SolveReport, Failure> {
-    let options_available = sharp.abstraction(&())?.options.options().len();
-    Ok(SolveReport {
-        schema: "sharp.solve/1",
-        status: "no_plan",
-        reason: None,
-        robot: sharp.world().robot.name.clone(),
-        options: file.kind.name(),
-        learning: args.learning.name(),
-        cost_update: args.cost_update.name(),
-        noise: args.noise.clone(),
-        simulator: args.simulator.clone(),
-        seed,
-        library: sharp.library().folder().map_or("none".to_owned(), |folder| folder.display().to_string()),
-        map: MapReport::new(&map.name, &map.grid),
-        regions: file.regions.clone(),
-        states: file.rbvd.len(),
-        options_available,
-        plan: vec![],
-        reuse: Reuse { uses: 0, reused: 0 },
-        predicted: None,
-        time_s: SolveTimes::default(),
-        plan_dir: None,
-    })
-}
-
 /// The folder asked for, or a fresh one.
-fn plan_folder(args: &Solve, map: &MapFile, world: &World) -> Result<PathBuf, Failure> {
+fn plan_folder(args: &Solve, problem: &NamedProblem) -> Result<PathBuf, Failure> {
     if let Some(folder) = &args.out {
         return Ok(folder.clone());
     }
-    let problem = args.problem.map_or(String::new(), |number| format!("-p{number}"));
+    let number = args.problem.map_or(String::new(), |number| format!("-p{number}"));
     let kind = sharp_options::OptionKind::from(args.abstraction.options).name();
-    let stem = format!("{}{problem}-{}-{kind}", map.name, world.robot.name);
+    let stem = format!("{}{number}-{}-{kind}", problem.map, problem.world.robot.name);
     let root = Path::new("sharp-plans");
     (1..100_000)
         .map(|number| root.join(format!("{stem}-{number}")))
         .find(|folder| !folder.exists())
         .ok_or_else(|| Failure::new("FILE_INVALID", "sharp-plans is full, name a folder with --out"))
-}
-
-fn write_plan(
-    plan: &Plan,
-    folder: &Path,
-    (sharp, file): (&Sharp, &AbstractionFile),
-    report: &SolveReport,
-) -> Result<(), Failure> {
-    plan.save(folder, file)?;
-    let grid = &plan.world.grid;
-    sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
-    let heatmap = sharp.detection().and_then(|found| pipeline::heatmap(grid.frame(), found));
-    if let Some(heatmap) = &heatmap {
-        let regions = pictures::regions_of(&file.rbvd);
-        pictures::write(folder, "regions", &pictures::regions(grid, heatmap, &regions))?;
-    }
-    pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction))?;
-    pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[]))?;
-    write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;
-    Ok(())
 }
 
 fn print_report(report: &SolveReport) {
@@ -200,17 +102,17 @@ fn print_report(report: &SolveReport) {
     if let Some(reason) = &report.reason {
         say!("{reason}");
     }
-    for leg in &report.plan {
+    for option in &report.plan {
         say!(
             "  {:<14} {:>5.1} m  time {:>5} s  cost {:>6.1} s  succeeds {:>4}/{:<4} on arrival  {}{}",
-            leg.option,
-            leg.length_m,
-            leg.time_s.map_or("-".to_owned(), |seconds| format!("{seconds:.1}")),
-            leg.cost_s,
-            leg.on_arrival.successes,
-            leg.on_arrival.episodes,
-            leg.policy,
-            if leg.reused { ", reused" } else { "" }
+            option.option,
+            option.length_m,
+            option.time_s.map_or("-".to_owned(), |seconds| format!("{seconds:.1}")),
+            option.cost_s,
+            option.on_arrival.successes,
+            option.on_arrival.episodes,
+            option.policy,
+            if option.reused { ", reused" } else { "" }
         );
     }
     if let Some(predicted) = &report.predicted {

@@ -10,11 +10,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sharp_bench::{ResultLine, problem_folder};
 use sharp_plan::{hash, write_atomic};
 
 use super::manifest::Job;
-use crate::outcome::{Failure, to_json};
+use crate::error::BenchError;
+use crate::json::to_json;
+use crate::result::{ResultLine, problem_folder};
 
 const SCHEMA: &str = "sharp.step/1";
 /// What the names of folders that are still worked in end with.
@@ -30,9 +31,11 @@ pub(super) struct JobStep<'a> {
 
 /// A result with its line as it was written: what is merged are these bytes.
 #[derive(Clone, Debug)]
-pub(crate) struct Done {
-    pub(crate) line: ResultLine,
-    pub(crate) text: String,
+pub struct Done {
+    /// The result.
+    pub line: ResultLine,
+    /// Its line.
+    pub text: String,
 }
 
 /// The first line of `result.jsonl`; the result follows.
@@ -55,7 +58,7 @@ impl JobStep<'_> {
     ///
     /// # Errors
     /// Returns an error that names the file if it is damaged or of another job.
-    pub(super) fn read(&self) -> Result<Option<Done>, Failure> {
+    pub(super) fn read(&self) -> Result<Option<Done>, BenchError> {
         let path = self.folder().join("result.jsonl");
         if !path.exists() {
             return Ok(None);
@@ -64,7 +67,7 @@ impl JobStep<'_> {
             let folder = self.folder();
             let message =
                 format!("{}: {problem}; remove {} to do it again", path.display(), folder.display());
-            Failure::new("FILE_INVALID", message)
+            BenchError::Folder(message)
         };
         let text = fs::read_to_string(&path).map_err(|error| damaged(&error.to_string()))?;
         let mut lines = text.lines();
@@ -84,8 +87,8 @@ impl JobStep<'_> {
     pub(super) fn make(
         &self,
         before: Option<&JobStep<'_>>,
-        work: impl FnOnce(&Path, &Path) -> Result<Option<ResultLine>, Failure>,
-    ) -> Result<Option<Done>, Failure> {
+        work: impl FnOnce(&Path, &Path) -> Result<Option<ResultLine>, BenchError>,
+    ) -> Result<Option<Done>, BenchError> {
         let made = self.make_apart(before, work);
         match self.read() {
             // Whatever went wrong here: another process has done the step.
@@ -98,8 +101,8 @@ impl JobStep<'_> {
     fn make_apart(
         &self,
         before: Option<&JobStep<'_>>,
-        work: impl FnOnce(&Path, &Path) -> Result<Option<ResultLine>, Failure>,
-    ) -> Result<(), Failure> {
+        work: impl FnOnce(&Path, &Path) -> Result<Option<ResultLine>, BenchError>,
+    ) -> Result<(), BenchError> {
         let folder = self.folder();
         let parent = folder.parent().unwrap_or(self.dir);
         fs::create_dir_all(parent).map_err(|error| unwritable(parent, &error))?;
@@ -170,18 +173,18 @@ fn sync(folder: &Path) {
     let _ = fs::File::open(folder).and_then(|folder| folder.sync_all());
 }
 
-fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new("FILE_INVALID", format!("{}: {error}", path.display()))
+fn unwritable(path: &Path, error: &std::io::Error) -> BenchError {
+    BenchError::Folder(format!("{}: {error}", path.display()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jobs::Experiment;
     use crate::jobs::Manifest;
-    use crate::jobs::spec::Spec;
 
     fn manifest(dir: &Path) -> Manifest {
-        Manifest::extend(dir, vec![Spec::example()], "call").expect("a plan").0
+        Manifest::extend(dir, vec![Experiment::example()], "call").expect("a plan").0
     }
 
     fn line(problem: usize) -> ResultLine {
@@ -209,7 +212,7 @@ mod tests {
         assert!(broken.expect("no error").is_none() && !first.folder().exists(), "interrupted");
         let failed = first.make(None, |_, library| {
             learn(library, 0);
-            Err(Failure::new("FAILED", "a bad day"))
+            Err(BenchError::Engine("a bad day".into()))
         });
         assert_eq!(failed.expect_err("an error").to_string(), "a bad day");
         for (step, before, known) in [(first, None, 0), (second, Some(&first), 1)] {

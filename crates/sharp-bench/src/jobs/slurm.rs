@@ -8,55 +8,109 @@
 use std::fmt::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf, absolute};
-use std::process::Command;
+use std::process::{Command, Output};
+use std::thread::sleep;
+use std::time::Duration;
 
-use anyhow::Context;
 use sharp_plan::write_atomic;
 
+use super::engine::{Engine, EngineMonitor};
 use super::manifest::{Job, Manifest};
-use crate::outcome::Failure;
+use super::merge::{count_results, unfinished};
+use crate::error::BenchError;
 
 /// Seconds before the end of a task's time at which it is asked to stop: enough to write what is done.
 const WARNING_S: u32 = 30;
 
+/// Times that jobs which a cluster lost are submitted.
+const ROUNDS: usize = 3;
+/// Expected length of a task, seconds.
+const PACK_S: f64 = 600.0;
+/// Between two looks at the queue.
+const LOOK: Duration = Duration::from_secs(2);
+
+/// Jobs as tasks of a Slurm cluster, all nodes of which see the manifest's folder and the program.
+#[derive(Clone, Debug)]
+pub struct SlurmEngine {
+    /// The `sharp` command, which does a block of jobs with `jobs run`.
+    pub program: PathBuf,
+}
+
+impl Engine for SlurmEngine {
+    /// Submits what is not finished, waits, and submits again what the cluster lost.
+    fn run(
+        &self,
+        manifest: &Manifest,
+        indices: &[usize],
+        monitor: &dyn EngineMonitor,
+    ) -> Result<Vec<BenchError>, BenchError> {
+        let jobs = indices.iter().map(|&index| manifest.job(index)).collect::<Result<Vec<_>, _>>()?;
+        let weight_s: f64 = jobs.iter().map(|job| job.weight_s).sum();
+        // Tasks of minutes, but some of them even for a small suite.
+        let pack_s = PACK_S.min(weight_s / 16.0);
+        let submission = Submission { array_limit: None, time_min: None, pack_s, sbatch: vec![] };
+        for _ in 0..ROUNDS {
+            let open: Vec<usize> =
+                unfinished(manifest).into_iter().filter(|index| indices.contains(index)).collect();
+            if open.is_empty() {
+                break;
+            }
+            let cluster = SlurmScripts::write(&self.program, manifest, &open, &submission)?;
+            let array = cluster.submit()?;
+            let (tasks, logs) = (cluster.tasks, cluster.logs());
+            monitor.message(&format!("array {array} of {tasks} tasks, logs in {}", logs.display()));
+            while is_queued(&array)? {
+                if monitor.should_stop() {
+                    monitor.message(&format!("array {array} goes on; this call again finds what it made"));
+                    return Ok(vec![]);
+                }
+                monitor.results_so_far(count_results(manifest, indices));
+                sleep(LOOK);
+            }
+        }
+        Ok(vec![])
+    }
+}
+
 /// How jobs are handed over.
 #[derive(Clone, Debug)]
-pub(crate) struct Submission {
+pub struct Submission {
     /// Tasks at once.
-    pub(crate) array_limit: Option<u32>,
+    pub array_limit: Option<u32>,
     /// Wall time of a task, minutes.
-    pub(crate) time_min: Option<u32>,
+    pub time_min: Option<u32>,
     /// Expected length of a task, seconds.
-    pub(crate) pack_s: f64,
+    pub pack_s: f64,
     /// What else sbatch is told.
-    pub(crate) sbatch: Vec<String>,
+    pub sbatch: Vec<String>,
 }
 
 /// The scripts for one folder.
-#[derive(Debug)]
-pub(crate) struct Cluster {
+#[derive(Clone, Debug)]
+pub struct SlurmScripts {
     dir: PathBuf,
     /// The script of the array.
-    pub(crate) array: PathBuf,
+    pub array: PathBuf,
     /// The script of the merge.
-    pub(crate) merge: PathBuf,
+    pub merge: PathBuf,
     /// Number of tasks.
-    pub(crate) tasks: usize,
+    pub tasks: usize,
     sbatch: Vec<String>,
 }
 
-impl Cluster {
-    /// Writes the scripts that do those of the jobs `indices` (ascending) that are not finished.
+impl SlurmScripts {
+    /// Writes the scripts with which `program` does the jobs `indices` (ascending) of `manifest`.
     ///
     /// # Errors
     /// Returns an error if they cannot be written.
-    pub(crate) fn write(
+    pub fn write(
+        program: &Path,
         manifest: &Manifest,
         indices: &[usize],
         submission: &Submission,
-    ) -> Result<Self, Failure> {
-        let dir = absolute(&manifest.dir).context("the folder of the jobs has no path")?;
-        let program = std::env::current_exe().context("this program has no path")?;
+    ) -> Result<Self, BenchError> {
+        let dir = absolute(&manifest.dir)
+            .map_err(|error| BenchError::Folder(format!("{}: {error}", manifest.dir.display())))?;
         let jobs: Vec<&Job> = indices.iter().map(|&index| &manifest.jobs[index]).collect();
         if let Some(minutes) = submission.time_min {
             check_time(&jobs, minutes)?;
@@ -64,8 +118,8 @@ impl Cluster {
         let blocks = blocks(&jobs, submission.pack_s);
         let folder = dir.join("slurm");
         let (array, merge) = (folder.join("array.sh"), folder.join("merge.sh"));
-        write_atomic(&array, array_script(&program, &dir, &blocks, submission).as_bytes())?;
-        write_atomic(&merge, merge_script(&program, &dir).as_bytes())?;
+        write_atomic(&array, array_script(program, &dir, &blocks, submission).as_bytes())?;
+        write_atomic(&merge, merge_script(program, &dir).as_bytes())?;
         Ok(Self { dir, array, merge, tasks: blocks.len(), sbatch: submission.sbatch.clone() })
     }
 
@@ -73,7 +127,7 @@ impl Cluster {
     ///
     /// # Errors
     /// Returns an error that says what sbatch said.
-    pub(crate) fn submit(&self) -> Result<String, Failure> {
+    pub fn submit(&self) -> Result<String, BenchError> {
         self.sbatch(&self.array, &[])
     }
 
@@ -81,19 +135,19 @@ impl Cluster {
     ///
     /// # Errors
     /// Returns an error that says what sbatch said.
-    pub(crate) fn submit_merge(&self, id: &str) -> Result<String, Failure> {
+    pub fn submit_merge(&self, id: &str) -> Result<String, BenchError> {
         let after = format!("--dependency=afterok:{id}");
         self.sbatch(&self.merge, &[&after, "--kill-on-invalid-dep=yes"])
     }
 
-    fn sbatch(&self, script: &Path, extra: &[&str]) -> Result<String, Failure> {
+    fn sbatch(&self, script: &Path, extra: &[&str]) -> Result<String, BenchError> {
         let mut command = Command::new("sbatch");
         command.arg("--parsable").args(&self.sbatch).args(extra).arg(script);
-        let output = command.output().context("cannot start sbatch")?;
+        let output = output(&mut command)?;
         let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
         if !output.status.success() {
             let script = script.display();
-            return Err(Failure::new("SLURM", format!("sbatch {script}: {}", said(&output.stderr))));
+            return Err(BenchError::Slurm(format!("sbatch {script}: {}", said(&output.stderr))));
         }
         let id = said(&output.stdout);
         // With several clusters the name of the cluster follows.
@@ -101,7 +155,7 @@ impl Cluster {
     }
 
     /// Where the tasks write what they say.
-    pub(crate) fn logs(&self) -> PathBuf {
+    pub fn logs(&self) -> PathBuf {
         self.dir.join("slurm")
     }
 }
@@ -110,18 +164,23 @@ impl Cluster {
 ///
 /// # Errors
 /// Returns an error if squeue cannot be started.
-pub(crate) fn is_queued(id: &str) -> Result<bool, Failure> {
-    let output = Command::new("squeue").args(["--noheader", "--format=%i", "--jobs", id]).output();
-    let output = output.context("cannot start squeue")?;
+fn is_queued(id: &str) -> Result<bool, BenchError> {
+    let output = output(Command::new("squeue").args(["--noheader", "--format=%i", "--jobs", id]))?;
     // A job that is over for some minutes is unknown, which is an error of squeue. One that cannot ask
     // because the controller is away says so otherwise.
     let text = String::from_utf8_lossy(&output.stderr);
     Ok(if output.status.success() { !output.stdout.is_empty() } else { !text.contains("Invalid job id") })
 }
 
+/// What `command` says.
+fn output(command: &mut Command) -> Result<Output, BenchError> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    command.output().map_err(|error| BenchError::Slurm(format!("cannot start {name}: {error}")))
+}
+
 /// A problem is done whole or again: a task must have time for one, or it would begin it for ever.
-fn check_time(jobs: &[&Job], minutes: u32) -> Result<(), Failure> {
-    let problem_s = |job: &&&Job| job.weight_s / job.spec.problems.len().max(1) as f64;
+fn check_time(jobs: &[&Job], minutes: u32) -> Result<(), BenchError> {
+    let problem_s = |job: &&&Job| job.weight_s / job.experiment.problems.len().max(1) as f64;
     let Some(longest) = jobs.iter().max_by(|a, b| problem_s(a).total_cmp(&problem_s(b))) else {
         return Ok(());
     };
@@ -130,11 +189,10 @@ fn check_time(jobs: &[&Job], minutes: u32) -> Result<(), Failure> {
         return Ok(());
     }
     let name = &longest.name;
-    let message = format!(
-        "--time is {minutes}, a problem of job {name} is expected to take {:.0} minutes",
-        (needed_s / 60.0).ceil()
-    );
-    Err(Failure::new("USAGE", message))
+    let needed_min = (needed_s / 60.0).ceil();
+    let problem =
+        format!("{minutes} min, a problem of job {name} is expected to take {needed_min:.0} minutes");
+    Err(BenchError::Setting { setting: "time", problem })
 }
 
 /// Ranges of consecutive jobs, each expected to take `pack_s` at least if there are enough.
@@ -209,11 +267,11 @@ fn quoted(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::spec::Spec;
+    use crate::jobs::Experiment;
 
     fn manifest(dir: &Path, trials: u32) -> Manifest {
-        let specs = (0..trials).map(|trial| Spec { trial, ..Spec::example() }).collect();
-        Manifest::extend(dir, specs, "call").expect("a plan").0
+        let experiments = (0..trials).map(|trial| Experiment { trial, ..Experiment::example() }).collect();
+        Manifest::extend(dir, experiments, "call").expect("a plan").0
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The plan of many jobs: `DIR/manifest.jsonl`, one line a job, `sharp.jobs/1`.
+//! The plan of many jobs: `DIR/manifest.jsonl`, one line a job, `sharp.jobs/2`.
 //!
 //! Planning again adds what is new and moves nothing: an index means the same job for ever, so that an
 //! array of tasks that is still waiting in a queue does what it was submitted for.
@@ -9,35 +9,44 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sharp_plan::write_atomic;
 
-use super::spec::Spec;
-use crate::outcome::{Failure, to_json};
+use super::experiment::Experiment;
+use crate::error::BenchError;
+use crate::json::to_json;
 
-const SCHEMA: &str = "sharp.jobs/1";
+const SCHEMA: &str = "sharp.jobs/2";
 
 /// One line of the manifest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Job {
+pub struct Job {
     schema: String,
     /// Its place in the manifest, from 0.
-    pub(crate) index: usize,
+    pub index: usize,
     /// The folder below `DIR/jobs` that holds what it makes.
-    pub(crate) name: String,
-    /// The hash of its specification.
-    pub(crate) key: String,
+    pub name: String,
+    /// The hash of its experiment.
+    pub key: String,
     /// Expected processor time, seconds.
-    pub(crate) weight_s: f64,
+    pub weight_s: f64,
     /// The call that planned it.
-    pub(crate) command: String,
-    pub(crate) spec: Spec,
+    pub command: String,
+    /// What it measures.
+    pub experiment: Experiment,
 }
 
 /// All jobs of one folder.
-#[derive(Debug)]
-pub(crate) struct Manifest {
+#[derive(Clone, Debug)]
+pub struct Manifest {
     /// The folder that all jobs share.
-    pub(crate) dir: PathBuf,
+    pub dir: PathBuf,
     /// By index.
-    pub(crate) jobs: Vec<Job>,
+    pub jobs: Vec<Job>,
+}
+
+impl Job {
+    /// `source`, told with the job that it happened in.
+    pub(super) fn error(&self, source: BenchError) -> BenchError {
+        BenchError::Job { index: self.index, name: self.name.clone(), source: Box::new(source) }
+    }
 }
 
 impl Manifest {
@@ -45,9 +54,9 @@ impl Manifest {
     ///
     /// # Errors
     /// Returns an error that names the file, and the line that is broken.
-    pub(crate) fn open(dir: &Path) -> Result<Self, Failure> {
+    pub fn open(dir: &Path) -> Result<Self, BenchError> {
         let path = path(dir);
-        let broken = |problem: String| Failure::new("FILE_INVALID", format!("{}{problem}", path.display()));
+        let broken = |problem: String| BenchError::Folder(format!("{}{problem}", path.display()));
         let text = std::fs::read_to_string(&path).map_err(|error| match error.kind() {
             ErrorKind::NotFound => broken(": there is no manifest, make one with sharp jobs plan".into()),
             _ => broken(format!(": {error}")),
@@ -59,15 +68,20 @@ impl Manifest {
         Ok(Self { dir: dir.to_owned(), jobs })
     }
 
-    /// Adds those of `specs` that are not planned yet; returns the whole plan and the indices of `specs`.
+    /// Adds those of `experiments` that are not planned yet by the call `command`; returns the whole plan and the
+    /// indices of `experiments`.
     ///
     /// # Errors
     /// Returns an error if the manifest there is broken or cannot be written.
-    pub(crate) fn extend(dir: &Path, specs: Vec<Spec>, command: &str) -> Result<(Self, Vec<usize>), Failure> {
+    pub fn extend(
+        dir: &Path,
+        experiments: Vec<Experiment>,
+        command: &str,
+    ) -> Result<(Self, Vec<usize>), BenchError> {
         let mut manifest =
             if path(dir).exists() { Self::open(dir)? } else { Self { dir: dir.to_owned(), jobs: vec![] } };
         let planned = manifest.jobs.len();
-        let indices = specs.into_iter().map(|spec| manifest.index_of(spec, command)).collect();
+        let indices = experiments.into_iter().map(|one| manifest.index_of(one, command)).collect();
         if manifest.jobs.len() > planned {
             let text: String = manifest.jobs.iter().map(|job| to_json(job) + "\n").collect();
             write_atomic(&path(dir), text.as_bytes())?;
@@ -75,8 +89,8 @@ impl Manifest {
         Ok((manifest, indices))
     }
 
-    fn index_of(&mut self, spec: Spec, command: &str) -> usize {
-        let key = spec.key();
+    fn index_of(&mut self, experiment: Experiment, command: &str) -> usize {
+        let key = experiment.key();
         if let Some(job) = self.jobs.iter().find(|job| job.key == key) {
             return job.index;
         }
@@ -84,11 +98,11 @@ impl Manifest {
         self.jobs.push(Job {
             schema: SCHEMA.to_owned(),
             index,
-            name: spec.name(),
+            name: experiment.name(),
             key,
-            weight_s: spec.weight_s(),
+            weight_s: experiment.weight_s(),
             command: command.to_owned(),
-            spec,
+            experiment,
         });
         index
     }
@@ -97,10 +111,10 @@ impl Manifest {
     ///
     /// # Errors
     /// Returns an error if there is none.
-    pub(crate) fn job(&self, index: usize) -> Result<&Job, Failure> {
+    pub fn job(&self, index: usize) -> Result<&Job, BenchError> {
         self.jobs.get(index).ok_or_else(|| {
-            let message = format!("job {index} does not exist, there are {}", self.jobs.len());
-            Failure::new("USAGE", message)
+            let problem = format!("job {index} does not exist, there are {}", self.jobs.len());
+            BenchError::Setting { setting: "index", problem }
         })
     }
 }
@@ -111,7 +125,7 @@ fn path(dir: &Path) -> PathBuf {
 
 fn parse(index: usize, line: &str) -> Result<Job, String> {
     let job: Job = serde_json::from_str(line).map_err(|error| error.to_string())?;
-    let (key, name) = (job.spec.key(), job.spec.name());
+    let (key, name) = (job.experiment.key(), job.experiment.name());
     for (field, is, expected) in [
         ("schema", &*job.schema, SCHEMA),
         ("index", &*job.index.to_string(), &*index.to_string()),
@@ -129,8 +143,8 @@ fn parse(index: usize, line: &str) -> Result<Job, String> {
 mod tests {
     use super::*;
 
-    fn trials(count: u32) -> Vec<Spec> {
-        (0..count).map(|trial| Spec { trial, ..Spec::example() }).collect()
+    fn trials(count: u32) -> Vec<Experiment> {
+        (0..count).map(|trial| Experiment { trial, ..Experiment::example() }).collect()
     }
 
     #[test]
@@ -138,8 +152,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let (first, indices) = Manifest::extend(folder.path(), trials(2), "one").expect("a plan");
         assert_eq!(indices, [0, 1]);
-        let specs: Vec<Spec> = trials(3).into_iter().rev().collect();
-        let (second, indices) = Manifest::extend(folder.path(), specs, "two").expect("a plan");
+        let experiments: Vec<Experiment> = trials(3).into_iter().rev().collect();
+        let (second, indices) = Manifest::extend(folder.path(), experiments, "two").expect("a plan");
         assert_eq!(indices, [2, 1, 0], "in the order asked for");
         assert_eq!(second.jobs[..2], first.jobs[..], "planned jobs stay as they are");
         assert_eq!(Manifest::open(folder.path()).expect("a plan").jobs, second.jobs, "as written");
@@ -157,7 +171,7 @@ mod tests {
             ("\"index\":1", "\"index\":7", "line 2: index is 7, expected 1"),
             ("\"trial\":1", "\"trial\":5", "line 2: key is"),
             ("\"env\":\"a\"", "\"env\":", "line 1: expected value"),
-            ("jobs/1", "jobs/9", "line 1: schema is sharp.jobs/9, expected sharp.jobs/1"),
+            ("jobs/2", "jobs/9", "line 1: schema is sharp.jobs/9, expected sharp.jobs/2"),
         ] {
             std::fs::write(&path, sound.replace(from, to)).expect("a file");
             let message = Manifest::open(folder.path()).expect_err("broken").to_string();

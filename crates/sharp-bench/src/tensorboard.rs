@@ -3,6 +3,8 @@
 //! A file is a row of records (length, checksum, payload, checksum), each payload an `Event` in the
 //! encoding of protocol buffers. Both formats are simple enough to write out here.
 
+#![allow(clippy::disallowed_methods, reason = "an event has the time at which it was written")]
+
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
@@ -10,13 +12,16 @@ use std::time::SystemTime;
 
 /// An event file that grows.
 #[derive(Debug)]
-pub(crate) struct EventFile {
+pub struct EventFile {
     file: File,
 }
 
 impl EventFile {
     /// Opens a new file in `folder`; readers take all files of a folder as one run.
-    pub(crate) fn create(folder: &Path) -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// If the folder or the file cannot be made.
+    pub fn create(folder: &Path) -> io::Result<Self> {
         std::fs::create_dir_all(folder)?;
         let now_s = now_s();
         let name = format!("events.out.tfevents.{}.sharp.{}", now_s as u64, std::process::id());
@@ -29,7 +34,10 @@ impl EventFile {
     }
 
     /// Adds numbers at `step`.
-    pub(crate) fn scalars<S: AsRef<str>>(&mut self, step: u64, values: &[(S, f64)]) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn scalars<S: AsRef<str>>(&mut self, step: u64, values: &[(S, f64)]) -> io::Result<()> {
         let mut summary = Vec::new();
         for (tag, number) in values {
             let mut value = Vec::new();
@@ -42,7 +50,10 @@ impl EventFile {
     }
 
     /// Adds a PNG picture of `width` x `height` pixels at `step`.
-    pub(crate) fn picture(
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn picture(
         &mut self,
         step: u64,
         tag: &str,

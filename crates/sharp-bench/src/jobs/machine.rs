@@ -1,8 +1,24 @@
-//! What machine times are taken on.
+//! What times are taken on, and which program takes them.
+
+#![allow(clippy::disallowed_methods, reason = "a result says on which machine it was measured")]
 
 use std::fs;
+use std::sync::OnceLock;
 
-use sharp_bench::Machine;
+use sharp_plan::hash;
+
+use crate::result::Machine;
+
+/// Version and build of this program, as in `0.1.0+1f0c9a7e`: what two builds measure may differ.
+pub(super) fn version() -> &'static str {
+    static VERSION: OnceLock<String> = OnceLock::new();
+    VERSION.get_or_init(|| {
+        let version = env!("CARGO_PKG_VERSION");
+        // The first is there even if the file was replaced meanwhile.
+        let program = fs::read("/proc/self/exe").or_else(|_| fs::read(std::env::current_exe()?));
+        program.map_or(version.to_owned(), |bytes| format!("{version}+{}", &hash(&bytes)[..8]))
+    })
+}
 
 /// This machine, as far as the system tells.
 pub(super) fn machine() -> Machine {

@@ -6,33 +6,38 @@ use sharp_draw::{Scene, Trajectory, svg_to_png};
 use sharp_drive::EpisodeEnd;
 use sharp_plan::{Abstraction, Execution, Plan, Query, write_atomic};
 use sharp_rbvd::StateAbstraction;
-use sharp_regions::Heatmap;
 use sharp_space::{OccupancyGrid, Point, Region};
 
-use crate::outcome::Failure;
+use crate::error::BenchError;
 
 /// Longer side of the PNG beside each SVG, pixels.
 const PNG_SIDE_PX: u32 = 1200;
 
 /// Writes `svg` as `NAME.svg` and `NAME.png` into `folder`.
-pub(crate) fn write(folder: &Path, name: &str, svg: &str) -> Result<(), Failure> {
+///
+/// # Errors
+/// If the picture cannot be drawn or a file cannot be written.
+pub fn write(folder: &Path, name: &str, svg: &str) -> Result<(), BenchError> {
     write_atomic(&folder.join(format!("{name}.svg")), svg.as_bytes())?;
     write_atomic(&folder.join(format!("{name}.png")), &svg_to_png(svg, PNG_SIDE_PX)?)?;
     Ok(())
 }
 
-/// The heat map of criticality with the outlines of the regions made from it.
-pub(crate) fn regions(grid: &OccupancyGrid, heatmap: &Heatmap, regions: &[Region]) -> String {
-    Scene::new(grid).heat_map(heatmap.values(), "criticality").regions(regions).to_svg()
+/// How critical each cell is, 0 to 1, with the outlines of the regions made from it.
+#[must_use]
+pub fn regions(grid: &OccupancyGrid, criticality: &[f32], regions: &[Region]) -> String {
+    Scene::new(grid).heat_map(criticality, "criticality").regions(regions).to_svg()
 }
 
 /// The regions of all states.
-pub(crate) fn regions_of(states: &dyn StateAbstraction) -> Vec<Region> {
+#[must_use]
+pub fn regions_of(states: &dyn StateAbstraction) -> Vec<Region> {
     states.regions().to_vec()
 }
 
 /// Cells coloured by state, with endpoints and options.
-pub(crate) fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> String {
+#[must_use]
+pub fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> String {
     let (rbvd, options) = (&*abstraction.states, &abstraction.options);
     let regions = regions_of(rbvd);
     let frame = grid.frame();
@@ -55,7 +60,8 @@ pub(crate) fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> St
 }
 
 /// The plan's guides over the faded abstraction, with what was driven.
-pub(crate) fn plan(plan: &Plan, query: &Query, executions: &[Execution]) -> String {
+#[must_use]
+pub fn plan(plan: &Plan, query: &Query, executions: &[Execution]) -> String {
     let (rbvd, steps) = (&*plan.abstraction.states, &plan.solution.steps);
     let guides: Vec<Vec<Point>> = steps
         .iter()

@@ -1,6 +1,8 @@
 //! Learning curves for TensorBoard, under the names that Stable-Baselines3 gives them, so that its
 //! dashboards show ours beside theirs.
 
+#![allow(clippy::disallowed_methods, reason = "a curve has the steps a second of wall time")]
+
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,7 +17,7 @@ const EVERY_STEPS: u64 = 1000;
 
 /// The curves of one training: a folder with an event file.
 #[derive(Debug)]
-pub(crate) struct Curves {
+struct Curves {
     events: EventFile,
     begun: Instant,
     /// Environment steps of the first call: what an interrupted run had behind it.
@@ -25,12 +27,12 @@ pub(crate) struct Curves {
 }
 
 impl Curves {
-    pub(crate) fn create(folder: &Path) -> io::Result<Self> {
+    fn create(folder: &Path) -> io::Result<Self> {
         Ok(Self { events: EventFile::create(folder)?, begun: Instant::now(), first: None, last: 0 })
     }
 
     /// Notes a step of training; writes when a point is due, and after every evaluation.
-    pub(crate) fn note(&mut self, progress: &Progress<'_>) -> io::Result<()> {
+    fn note(&mut self, progress: &Progress<'_>) -> io::Result<()> {
         let steps = progress.env_steps;
         let first = *self.first.get_or_insert(steps);
         let is_due = steps / EVERY_STEPS > self.last / EVERY_STEPS || progress.evaluation.is_some();
@@ -70,28 +72,32 @@ fn scalars(progress: &Progress<'_>, fps: f64) -> Vec<(String, f64)> {
 
 /// The curves of many trainings, each in a folder of its own below one root.
 #[derive(Debug)]
-pub(crate) struct CurveFolder {
+pub struct CurveFolder {
     root: PathBuf,
     running: BTreeMap<String, Curves>,
     /// How many trainings of each name there were.
     counts: BTreeMap<String, u32>,
-    /// Set when a file could not be written: one message is enough, and learning goes on.
-    failed: bool,
+    /// Why a file could not be written: no more are tried, and learning goes on.
+    failure: Option<io::Error>,
 }
 
 impl CurveFolder {
-    pub(crate) fn new(root: &Path) -> Self {
-        Self { root: root.to_owned(), running: BTreeMap::new(), counts: BTreeMap::new(), failed: false }
+    /// Curves below the folder `root`, which is made when the first one is written.
+    #[must_use]
+    pub fn new(root: &Path) -> Self {
+        Self { root: root.to_owned(), running: BTreeMap::new(), counts: BTreeMap::new(), failure: None }
     }
 
-    /// Notes a step of the training called `name`.
-    pub(crate) fn note(&mut self, name: &str, progress: &Progress<'_>) {
-        if self.failed {
-            return;
-        }
-        if let Err(error) = self.try_note(name, progress) {
-            self.failed = true;
-            eprintln!("warning: no more curves in {}: {error}", self.root.display());
+    /// Why curves could not be written, if so.
+    #[must_use]
+    pub const fn failure(&self) -> Option<&io::Error> {
+        self.failure.as_ref()
+    }
+
+    /// Notes a step of the training called `name`. After a file could not be written it does nothing.
+    pub fn note(&mut self, name: &str, progress: &Progress<'_>) {
+        if self.failure.is_none() {
+            self.failure = self.try_note(name, progress).err();
         }
     }
 
@@ -165,7 +171,7 @@ mod tests {
         ] {
             assert_eq!(count(name), times, "{name}: at 1000 and 2000 steps, and at the evaluation");
         }
-        assert!(!folder.failed, "nothing went wrong");
+        assert!(folder.failure().is_none(), "nothing went wrong");
     }
 
     #[test]
@@ -184,6 +190,6 @@ mod tests {
         std::fs::write(root.path().join("file"), "").expect("a file");
         let mut folder = CurveFolder::new(&root.path().join("file"));
         note_training(&mut folder, "first");
-        assert!(folder.failed, "there is no folder below a file");
+        assert!(folder.failure().is_some(), "there is no folder below a file");
     }
 }

@@ -2,26 +2,26 @@
 
 use std::fs;
 
-use sharp_bench::ResultLine;
 use sharp_plan::write_atomic;
 
 use super::manifest::{Job, Manifest};
 use super::step::{Done, UNFINISHED};
 use super::work::steps;
-use crate::outcome::Failure;
+use crate::error::BenchError;
+use crate::result::ResultLine;
 
 /// All results that are there, and the jobs that are not whole.
 #[derive(Debug)]
-pub(crate) struct Merged {
+pub struct Merged {
     /// By job, each with its problems in order.
-    pub(crate) results: Vec<Vec<Done>>,
+    pub results: Vec<Vec<Done>>,
     /// The jobs that are not whole, and what is wrong with them.
-    pub(crate) missing: Vec<(usize, Failure)>,
+    pub missing: Vec<(usize, BenchError)>,
 }
 
 impl Merged {
     /// All results, in the order of the manifest.
-    pub(crate) fn lines(&self) -> impl Iterator<Item = &ResultLine> {
+    pub fn lines(&self) -> impl Iterator<Item = &ResultLine> {
         self.results.iter().flatten().map(|done| &done.line)
     }
 }
@@ -31,12 +31,12 @@ impl Merged {
 ///
 /// # Errors
 /// Returns an error if `results.jsonl` cannot be written. Damage and gaps are in [`Merged::missing`].
-pub(crate) fn merge(manifest: &Manifest) -> Result<Merged, Failure> {
+pub fn merge(manifest: &Manifest) -> Result<Merged, BenchError> {
     let mut merged = Merged { results: vec![], missing: vec![] };
     for job in &manifest.jobs {
         let (results, missing) = collect(manifest, job);
         merged.results.push(results);
-        merged.missing.extend(missing.map(|failure| (job.index, failure)));
+        merged.missing.extend(missing.map(|error| (job.index, error)));
     }
     let text: String = merged.results.iter().flatten().map(|done| format!("{}\n", done.text)).collect();
     write_atomic(&manifest.dir.join("results.jsonl"), text.as_bytes())?;
@@ -44,36 +44,39 @@ pub(crate) fn merge(manifest: &Manifest) -> Result<Merged, Failure> {
 }
 
 /// The results of `job`, and what is wrong if they are not all there.
-fn collect(manifest: &Manifest, job: &Job) -> (Vec<Done>, Option<Failure>) {
+fn collect(manifest: &Manifest, job: &Job) -> (Vec<Done>, Option<BenchError>) {
     let mut results = Vec::new();
-    let place = || format!("job {} ({})", job.index, job.name);
     for step in steps(&manifest.dir, job) {
         match step.read() {
             Ok(Some(done)) => results.push(done),
             Ok(None) => {
-                let failure = Failure::new("JOB_MISSING", format!("problem {} is missing", step.problem));
-                return (results, Some(failure.within(place())));
+                return (results, Some(job.error(BenchError::Missing(step.problem))));
             }
-            Err(failure) => return (results, Some(failure.within(place()))),
+            Err(error) => return (results, Some(job.error(error))),
         }
     }
     (results, None)
 }
 
 /// Indices of the jobs that are not whole.
-pub(crate) fn unfinished(manifest: &Manifest) -> Vec<usize> {
+#[must_use]
+pub fn unfinished(manifest: &Manifest) -> Vec<usize> {
     let is_open = |job: &&Job| collect(manifest, job).1.is_some();
     manifest.jobs.iter().filter(is_open).map(|job| job.index).collect()
 }
 
 /// Number of results of the jobs `indices` that are there.
-pub(crate) fn count_results(manifest: &Manifest, indices: &[usize]) -> usize {
+///
+/// # Panics
+/// If `manifest` has no such job.
+#[must_use]
+pub fn count_results(manifest: &Manifest, indices: &[usize]) -> usize {
     let of_job = |job| steps(&manifest.dir, job).filter(|step| step.folder().exists()).count();
     indices.iter().map(|&index| of_job(&manifest.jobs[index])).sum()
 }
 
 /// Removes what killed processes left of the jobs of `manifest`, all of which are done.
-pub(crate) fn clean(manifest: &Manifest) {
+pub fn clean(manifest: &Manifest) {
     for job in &manifest.jobs {
         let folder = manifest.dir.join("jobs").join(&job.name);
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

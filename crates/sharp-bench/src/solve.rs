@@ -1,0 +1,204 @@
+//! Solving one problem whole: library, abstraction, Algorithm 1, report, and the folder of the plan.
+
+use std::path::Path;
+
+use sharp_options::OptionKind;
+use sharp_plan::{
+    AbstractionFile, AbstractionSettings, Answer, Method, Monitor, OptionLibrary, Phase, Plan, Sharp, hash,
+    map_hash, write_atomic,
+};
+use sharp_rbvd::CellMetric;
+use sharp_sim::SimulatorKind;
+use sharp_space::Seed;
+
+use crate::error::BenchError;
+use crate::json::to_json;
+use crate::named::{DETECTORS, NamedProblem, detector};
+use crate::pictures;
+use crate::reports::{MapReport, SolveReport};
+use crate::stopwatch::TimedMonitor;
+use crate::times::{Reuse, SolveTimes};
+use sharp_drive::World;
+
+/// How the abstraction of a map is made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AbstractionRequest {
+    /// The kind of option.
+    pub options: OptionKind,
+    /// A detector's name, or a file of places: see [`named::detector`](crate::named::detector).
+    pub regions: String,
+    /// The distances of the diagram.
+    pub metric: CellMetric,
+}
+
+/// How a problem is solved.
+#[derive(Clone, Debug)]
+pub struct SolveSettings {
+    /// How the abstraction is made, where the library does not have it yet.
+    pub abstraction: AbstractionRequest,
+    /// How options get policies, how plans are searched, checked and repaired.
+    pub method: Method,
+    /// The simulator in which policies are learnt and the plan is verified.
+    pub simulator: SimulatorKind,
+    /// Root of all randomness.
+    pub seed: u64,
+}
+
+/// What solving gave.
+#[derive(Debug)]
+pub struct Solved {
+    /// What `solve.json` holds.
+    pub report: SolveReport,
+    /// The plan, if there is one.
+    pub plan: Option<Plan>,
+    /// The robot in its building, with what it knows.
+    sharp: Sharp,
+    file: AbstractionFile,
+}
+
+/// Algorithm 1 on `problem`, with what the library in the folder `library` holds; without a folder with nothing.
+///
+/// Nothing is written but what the method [saves at once](Method::saves_at_once), and the abstraction into the
+/// library: [`Solved::write`] and [`Solved::save_library`] do the rest.
+///
+/// # Errors
+/// If the robot does not fit at an end of the problem or nowhere in the map, or a file is broken.
+pub fn solve(
+    problem: &NamedProblem,
+    settings: &SolveSettings,
+    library: Option<&Path>,
+    monitor: &TimedMonitor<'_>,
+) -> Result<Solved, BenchError> {
+    let NamedProblem { world, query, noise_model, .. } = problem;
+    let SolveSettings { abstraction, method, simulator, seed } = settings;
+    query.check(world)?;
+    let library = match library {
+        Some(root) => OptionLibrary::open_for(root, world, noise_model, *simulator, method)?,
+        None => OptionLibrary::in_memory(),
+    };
+    monitor.phase(Phase::Done);
+    let (sharp, file) = prepare(world.clone(), abstraction, library.folder(), monitor)?;
+    let mut sharp = sharp
+        .with_method(method.clone())
+        .with_noise(noise_model.clone())
+        .with_simulator(world.simulator(*simulator))
+        .with_library(library)
+        .with_seed(Seed(*seed));
+    let answer = sharp.solve(*query, monitor)?;
+    let report = blank_report(problem, settings, &mut sharp, &file)?;
+    let (report, plan) = match answer {
+        Answer::Solved(plan) => (report.with_plan(&plan), Some(*plan)),
+        Answer::NoPlan(reason) => (SolveReport { reason: Some(reason), ..report }, None),
+        Answer::Stopped => {
+            let reason = "stopped before a plan was verified; what was learnt is kept".to_owned();
+            (SolveReport { status: "timeout", reason: Some(reason), ..report }, None)
+        }
+    };
+    monitor.phase(Phase::Done);
+    let report = SolveReport { time_s: monitor.times(), ..report };
+    Ok(Solved { report, plan, sharp, file })
+}
+
+/// A robot in `world` with the abstraction that `request` asks for: from the folder `cache` if that has it, else made
+/// and kept there.
+///
+/// # Errors
+/// If the detector is not known, the map has no room for the robot, or a file is broken.
+pub fn prepare(
+    world: World,
+    request: &AbstractionRequest,
+    cache: Option<&Path>,
+    monitor: &dyn Monitor,
+) -> Result<(Sharp, AbstractionFile), BenchError> {
+    let map = map_hash(&world.grid);
+    let settings = AbstractionSettings { metric: request.metric, ..AbstractionSettings::new(&world) };
+    let detector = detector(&world, &request.regions)?;
+    let mut sharp =
+        Sharp::new(world, detector).with_options(request.options).with_abstraction_settings(settings);
+    let path = cache.map(|folder| folder.join(request.file_name()));
+    if let Some(path) = path.as_deref().filter(|path| path.exists()) {
+        monitor.phase(Phase::Abstraction);
+        let file = AbstractionFile::load(path, &map)?;
+        return Ok((sharp.with_abstraction(file.abstraction(), &file.regions), file));
+    }
+    let file = sharp.abstraction_file(monitor)?;
+    if let Some(path) = path {
+        file.save(&path)?;
+    }
+    Ok((sharp, file))
+}
+
+impl AbstractionRequest {
+    /// Under which name a library keeps it.
+    fn file_name(&self) -> String {
+        let regions = match self.regions.as_str() {
+            name if DETECTORS.contains(&name) => name.to_owned(),
+            file => hash(&std::fs::read(file).unwrap_or_default())[..8].to_owned(),
+        };
+        format!("abstraction-{:?}-{:?}-{regions}.ron", self.options, self.metric).to_lowercase()
+    }
+}
+
+fn blank_report(
+    problem: &NamedProblem,
+    settings: &SolveSettings,
+    sharp: &mut Sharp,
+    file: &AbstractionFile,
+) -> Result<SolveReport, BenchError> {
+    let options_available = sharp.abstraction(&())?.options.options().len();
+    let method = &settings.method;
+    Ok(SolveReport {
+        schema: "sharp.solve/1",
+        status: "no_plan",
+        reason: None,
+        robot: problem.world.robot.name.clone(),
+        options: file.kind.name(),
+        learning: method.name.clone(),
+        cost_update: if method.search.cost_update { "on" } else { "off" },
+        noise: problem.noise.clone(),
+        simulator: settings.simulator.to_string(),
+        seed: settings.seed,
+        library: sharp.library().folder().map_or("none".to_owned(), |folder| folder.display().to_string()),
+        map: MapReport::new(&problem.map, &problem.world.grid),
+        regions: file.regions.clone(),
+        states: file.rbvd.len(),
+        options_available,
+        plan: vec![],
+        reuse: Reuse { uses: 0, reused: 0 },
+        predicted: None,
+        time_s: SolveTimes::default(),
+        plan_dir: None,
+    })
+}
+
+impl Solved {
+    /// Writes the plan, its map, its pictures and the report into `folder`, which the report calls `name`. Does nothing
+    /// without a plan.
+    ///
+    /// # Errors
+    /// If a picture cannot be drawn or a file cannot be written.
+    pub fn write(&mut self, folder: &Path, name: &Path) -> Result<(), BenchError> {
+        let Self { report, plan, sharp, file } = self;
+        let Some(plan) = plan else { return Ok(()) };
+        report.plan_dir = Some(name.display().to_string());
+        plan.save(folder, file)?;
+        let grid = &plan.world.grid;
+        sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
+        if let Some(criticality) = sharp.detection().and_then(|found| found.criticality.as_deref()) {
+            let regions = pictures::regions_of(&file.rbvd);
+            pictures::write(folder, "regions", &pictures::regions(grid, criticality, &regions))?;
+        }
+        pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction))?;
+        pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[]))?;
+        write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;
+        Ok(())
+    }
+
+    /// Writes what was learnt into the library.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn save_library(&mut self) -> Result<(), BenchError> {
+        Ok(self.sharp.library_mut().save()?)
+    }
+}
