@@ -17,8 +17,9 @@ use crate::worlds::{ROOMS, TestWorld};
 fn easy_option(world: &TestWorld) -> Arc<GuidedOption> {
     let query = Query { start: Pose::new(1.6, 1.8, 0.0), goal: Pose::new(6.6, 1.8, 0.0) };
     let method = Method::fast();
-    let search = Search::new(&world.world, &world.abstraction, &method, query, [], Seed(1));
-    let options = search.expect("both ends have room").plan(&|_| None, &()).expect("the door is wide");
+    let search =
+        Search::new(&world.world, &world.abstraction, &method, &NoiseModel::nominal(), query, [], Seed(1));
+    let (_, options) = search.expect("both ends have room").plan(&|_| None, &()).expect("the door is wide");
     let mut options = options.into_iter();
     options.find(|option| option.id.role() == Role::Option).expect("two regions lie between")
 }

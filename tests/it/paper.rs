@@ -130,11 +130,19 @@ fn planned_options_join_and_their_guides_lead_through() {
     for_every_world(|world, name| {
         let query = world.query(&mut Seed(3).stream(name, 0));
         let method = Method::fast();
-        let mut search = Search::new(&world.world, &world.abstraction, &method, query, [], Seed(3))
-            .expect("roomy places have a state");
+        let mut search = Search::new(
+            &world.world,
+            &world.abstraction,
+            &method,
+            &NoiseModel::nominal(),
+            query,
+            [],
+            Seed(3),
+        )
+        .expect("roomy places have a state");
         let (start, goal) = (state_at(world, query.start), state_at(world, query.goal));
         possible += usize::from(reachable(&*world.abstraction.states, start).contains(&goal));
-        if let Some(options) = search.plan(&|_| None, &()) {
+        if let Some((_, options)) = search.plan(&|_| None, &()) {
             planned += 1;
             assert_plan(world, &query, &options, name);
         }

@@ -85,10 +85,12 @@ pub struct OptionReport {
     pub time_s: Option<f64>,
     /// What the search counts: time per success, and the price of failures, seconds.
     pub cost_s: f64,
+    /// What the search took it to cost before it was measured, seconds.
+    pub price_s: f64,
 }
 
 impl OptionReport {
-    fn new(planned: &PlannedOption, failure_cost_s: f64) -> Self {
+    fn new(planned: &PlannedOption, plan: &Plan) -> Self {
         let PlannedOption { option, learnt, reused, on_arrival, arrival_time_s } = planned;
         Self {
             option: option.id.to_string(),
@@ -103,7 +105,8 @@ impl OptionReport {
             on_arrival: (*on_arrival).into(),
             length_m: option.guide.length_m(),
             time_s: arrival_time_s.is_finite().then_some(*arrival_time_s),
-            cost_s: learnt.cost_s(failure_cost_s),
+            cost_s: learnt.cost_s(plan.method.failure_cost_s),
+            price_s: plan.method.search.price_s(&plan.world, &plan.noise, &option.guide),
         }
     }
 }
@@ -172,7 +175,7 @@ impl SolveReport {
     pub(crate) fn with_plan(self, plan: &Plan) -> Self {
         let solution = &plan.solution;
         let (uses, reused) = solution.reuse();
-        let report = |step| OptionReport::new(step, plan.method.failure_cost_s);
+        let report = |step| OptionReport::new(step, plan);
         Self {
             status: "solved",
             plan: solution.steps.iter().map(report).collect(),

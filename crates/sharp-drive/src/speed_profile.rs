@@ -42,6 +42,16 @@ impl SpeedProfile {
         (0..=count).map(|i| self.scale(world, &view, i as f64 * SAMPLE_M)).collect()
     }
 
+    /// The time that the profile takes along `guide` when nothing disturbs the robot, seconds.
+    #[must_use]
+    pub fn time_s(&self, world: &World, guide: &GuidePath) -> f64 {
+        let speed = |scale: f64| (self.slow + (self.cruise - self.slow) * scale) * world.robot.max_speed_mps;
+        let seconds: f64 = self.along(world, guide).into_iter().map(|scale| SAMPLE_M / speed(scale)).sum();
+        // The samples reach beyond the end by less than two of them.
+        let count = (guide.length_m() / SAMPLE_M) as usize + 2;
+        seconds * guide.length_m() / (count as f64 * SAMPLE_M)
+    }
+
     /// The speed scale `arc_m` along the guide, from 0 (slowest) to 1 (cruise).
     fn scale(&self, world: &World, guide: &GuideView<'_>, arc_m: f64) -> f64 {
         let field = world.geometry.clearance();

@@ -143,7 +143,9 @@ impl OptionSpace {
                 .options
                 .get(option)
                 .map_or_else(Vec::new, |spec| self.options.allowed_states(spec, self.rule).collect()),
-            LegId::First(_) | LegId::Last(..) | LegId::Direct => vec![from, to],
+            LegId::First(_) | LegId::Last(..) => vec![from, to],
+            LegId::Direct if from == to => vec![from],
+            LegId::Direct => self.states.states().collect(),
         }
     }
 }

@@ -57,11 +57,11 @@ fn algorithm_1(
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
 ) -> Result<Outcome, FileError> {
-    let PlanningProblem { world, method, query, seed, monitor, .. } = *problem;
+    let PlanningProblem { world, method, conditions, query, seed, monitor } = *problem;
     monitor.phase(Phase::Search);
     // 8: s_i, s_g <- get_abstract_states(x_i, x_g)
     let known = Policies::guides(library);
-    let mut search = match Search::new(world, abstraction, method, query, known, seed) {
+    let mut search = match Search::new(world, abstraction, method, &conditions.noise, query, known, seed) {
         Ok(search) => search,
         Err(unplaced) => return Ok(Outcome::NoPlan(unplaced.to_string())),
     };
@@ -69,7 +69,12 @@ fn algorithm_1(
     let (mut best, mut verified): (Option<Solution>, usize) = (None, 0);
     for _ in 0..ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
-        let Some(p) = cheapest(problem, &mut search, &policies) else { break };
+        let Some((_, p)) = cheapest(problem, &mut search, &policies) else {
+            if search.offer_direct() {
+                continue;
+            }
+            break;
+        };
         // Beyond the paper: the guides of p are joined to one smooth path.
         let p = join(problem, p);
         // 10 to 20: Pi <- pi_0, o.policy for each o in p, pi_{n+1}; who has no policy (14) is trained (11, 16, 19)
@@ -77,28 +82,28 @@ fn algorithm_1(
             return Ok(Outcome::Stopped);
         }
         // 17: the cost of an option is now what was measured, so a weak one may have a better alternative.
-        let is_changed = |search: &mut Search<'_>, policies: &Policies<'_>| {
-            cheapest(problem, search, policies).is_some_and(|other| names(&other) != names(&p))
+        let other_s = |search: &mut Search<'_>, policies: &Policies<'_>| {
+            let other = cheapest(problem, search, policies).filter(|(_, other)| names(other) != names(&p));
+            other.map_or(f64::INFINITY, |(seconds, _)| seconds)
         };
-        if has_weak_option(problem, &p, &policies) && is_changed(&mut search, &policies) {
+        if has_weak_option(problem, &p, &policies) && other_s(&mut search, &policies).is_finite() {
             continue;
         }
-        // Beyond the paper: Pi is repaired, its success is counted, and a weak one makes the search look again.
+        // Beyond the paper: Pi is repaired and measured, and the search looks again while another plan seems cheaper.
         monitor.phase(Phase::Verify);
         if !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)? {
             return Ok(Outcome::Stopped);
         }
         let solution = verify(problem, &p, &policies);
-        let is_weak = solution.predicted.rate() < method.retry_below;
         verified += 1;
-        if is_weak {
-            charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
-        }
+        search.offer_direct();
+        charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
         let cost_s = |solution: &Solution| solution.estimate().cost_s(method.failure_cost_s);
         if best.as_ref().is_none_or(|best| cost_s(&solution) < cost_s(best)) {
             best = Some(solution);
         }
-        if !is_weak || verified == VERIFIED_MAX || !is_changed(&mut search, &policies) {
+        let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
+        if verified == VERIFIED_MAX || best_s <= method.retry_above * other_s(&mut search, &policies) {
             break;
         }
     }
@@ -114,12 +119,12 @@ fn names(plan: &[Arc<GuidedOption>]) -> Vec<LegId> {
     plan.iter().map(|option| option.id).collect()
 }
 
-/// The cheapest plan by all that is known by now.
+/// The cheapest plan by all that is known by now, and its cost in seconds.
 fn cheapest(
     problem: &PlanningProblem<'_>,
     search: &mut Search<'_>,
     policies: &Policies<'_>,
-) -> Option<Vec<Arc<GuidedOption>>> {
+) -> Option<(f64, Vec<Arc<GuidedOption>>)> {
     let cost_s = |id: LegId| policies.get(id).map(|learnt| learnt.cost_s(problem.method.failure_cost_s));
     search.plan(&cost_s, problem.monitor)
 }

@@ -144,19 +144,22 @@ impl ComposedPolicy {
     fn replan(&self) -> Option<(Vec<Arc<GuidedOption>>, Vec<OptionPolicy>)> {
         let plan = &*self.plan;
         let query = Query { start: self.automaton.observation().state.pose, goal: plan.solution.query.goal };
-        let known: BTreeMap<LegId, &PlannedOption> = plan
-            .solution
-            .steps
-            .iter()
-            .filter(|step| matches!(step.option.id, LegId::Option(_) | LegId::Last(..)))
-            .map(|step| (step.option.id, step))
-            .collect();
-        let guides = known.iter().map(|(&id, step)| (id, step.option.guide.clone()));
+        let known: BTreeMap<LegId, &PlannedOption> =
+            plan.solution.steps.iter().map(|step| (step.option.id, step)).collect();
+        // Those from the start begin elsewhere now: their policies are at hand, their guides and costs are not.
+        let is_kept = |id: &LegId| matches!(id, LegId::Option(_) | LegId::Last(..));
+        let kept = known.iter().filter(|(id, _)| is_kept(id));
+        let guides = kept.map(|(&id, step)| (id, step.option.guide.clone()));
         let seed = plan.seed.child("recovery", u64::from(self.events.recoveries));
         let mut search =
-            Search::new(&plan.world, &plan.abstraction, &plan.method, query, guides, seed).ok()?;
-        let cost_s = |id: LegId| known.get(&id).map(|step| step.learnt.cost_s(plan.method.failure_cost_s));
-        let options = search.plan(&cost_s, &())?;
+            Search::new(&plan.world, &plan.abstraction, &plan.method, &plan.noise, query, guides, seed)
+                .ok()?;
+        if known.contains_key(&LegId::Direct) {
+            search.offer_direct();
+        }
+        let measured_s = |step: &&PlannedOption| step.learnt.cost_s(plan.method.failure_cost_s);
+        let cost_s = |id: LegId| known.get(&id).filter(|_| is_kept(&id)).map(measured_s);
+        let (_, options) = search.plan(&cost_s, &())?;
         let cautious = || OptionPolicy::Follower(Follower::cautious(&plan.world.robot));
         let policy = |option: &Arc<GuidedOption>| {
             known.get(&option.id).map_or_else(cautious, |step| step.learnt.policy.clone())

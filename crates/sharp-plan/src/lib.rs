@@ -62,7 +62,7 @@ pub use learn::{
     Selection,
 };
 pub use library::{FORMAT, OptionLibrary, StoredOption};
-pub use method::{LearningOrder, Method, RepairSettings, SearchSettings};
+pub use method::{LearningOrder, Method, PriceRule, RepairSettings, SearchSettings};
 pub use option_graph::{Candidate, OptionGraph};
 pub use plan_file::{AbstractionFile, Plan, map_hash};
 pub use problem::PlanningProblem;

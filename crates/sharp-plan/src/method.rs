@@ -6,11 +6,15 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sharp_drive::FAILURE_COST_S;
-use sharp_guide::{GuidePlanner, GuideSettings, PlannerKind};
+use sharp_drive::{FAILURE_COST_S, ProfiledFollower, SpeedProfile, World};
+use sharp_guide::{GuidePath, GuidePlanner, GuideSettings, PlannerKind};
 use sharp_options::AllowedRule;
+use sharp_sim::NoiseModel;
 
 use crate::learn::{OptionLearner, PaperProtocol, PriorOnly, Selection};
+
+/// Prices are not exact: a plan that seems cheaper by less than this factor is not worth trying.
+const RETRY_ABOVE: f64 = 1.1;
 
 /// How a problem is solved.
 #[derive(Clone, Debug)]
@@ -40,8 +44,9 @@ pub struct Method {
     /// An option that succeeds less often than this makes the search look for a better way; 0 keeps whatever was
     /// learnt, as the paper does.
     pub usable_success: f64,
-    /// A plan that succeeds less often than this makes the search try other ways; 0 for never.
-    pub retry_below: f64,
+    /// A plan whose measured cost is more than this many times the price of another makes the search try that one;
+    /// infinite for never.
+    pub retry_above: f64,
     /// How a plan that succeeds too rarely is repaired.
     pub repair: RepairSettings,
     /// Fresh runs through the whole plan that its predicted success is counted on.
@@ -71,11 +76,22 @@ pub struct RepairSettings {
     pub screening_episodes: u32,
 }
 
+/// What an option is taken to cost before anything was measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PriceRule {
+    /// The length of its guide at nominal speed: the paper's rule.
+    Length,
+    /// The time of a speed profile along its guide: slow in narrow places and before bends.
+    Profile,
+}
+
 /// What the search may assume and must respect.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct SearchSettings {
+    /// What an option is taken to cost before anything was measured.
+    pub price: PriceRule,
     /// Speed that turns lengths into seconds before anything was measured, as a share of the top speed.
     pub nominal_speed: f64,
     /// Seconds added to an option without a policy: what training is worth; 0 is the paper's rule.
@@ -85,6 +101,8 @@ pub struct SearchSettings {
     pub bypass_surcharge_s: f64,
     /// Options may pass a centroid by; false keeps to the paper's.
     pub bypasses: bool,
+    /// A plan may also go from start to goal without any option, where that is cheaper; false keeps to the paper's.
+    pub direct: bool,
     /// Learnt options cost what was measured of them (line 17 of Algorithm 1); false keeps the first costs.
     pub cost_update: bool,
     /// Largest turn between two guides that a robot which turns in place makes without stopping, radians.
@@ -98,15 +116,33 @@ pub struct SearchSettings {
 impl Default for SearchSettings {
     fn default() -> Self {
         Self {
+            price: PriceRule::Profile,
             nominal_speed: 0.5,
             untrained_surcharge_s: 8.0,
             bypass_surcharge_s: 14.0,
             bypasses: true,
+            direct: true,
             cost_update: true,
             // The footprint swings out in a turn: beyond 75 degrees it needs clearance or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),
             allowed: AllowedRule::Code,
             guide: GuideSettings::default(),
+        }
+    }
+}
+
+impl SearchSettings {
+    /// What an option with `guide` is taken to cost under `noise` before it is measured, seconds, without surcharges.
+    #[must_use]
+    pub fn price_s(&self, world: &World, noise: &NoiseModel, guide: &GuidePath) -> f64 {
+        self.price_with(&ProfiledFollower::tuned(&world.robot, noise).speed, world, guide)
+    }
+
+    /// The same with the speed profile for the noise.
+    pub(crate) fn price_with(&self, profile: &SpeedProfile, world: &World, guide: &GuidePath) -> f64 {
+        match self.price {
+            PriceRule::Length => guide.length_m() / (self.nominal_speed * world.robot.max_speed_mps),
+            PriceRule::Profile => profile.time_s(world, guide),
         }
     }
 }
@@ -128,7 +164,7 @@ impl Method {
         Self {
             name: "fast".to_owned(),
             learner: Arc::new(selection),
-            retry_below: 0.97,
+            retry_above: RETRY_ABOVE,
             repair: RepairSettings { rounds: 3, episodes: 1000, wanted_success: 0.99, screening_episodes },
             ..Self::prior()
         }
@@ -142,8 +178,10 @@ impl Method {
             name: "paper".to_owned(),
             learner: Arc::new(PaperProtocol::default()),
             search: SearchSettings {
+                price: PriceRule::Length,
                 untrained_surcharge_s: 0.0,
                 bypasses: false,
+                direct: false,
                 allowed: AllowedRule::Paper,
                 ..SearchSettings::default()
             },
@@ -173,7 +211,7 @@ impl Method {
             failure_cost_s: FAILURE_COST_S,
             join_guides: true,
             usable_success: 0.9,
-            retry_below: 0.0,
+            retry_above: f64::INFINITY,
             repair: RepairSettings {
                 rounds: 0,
                 episodes: 1000,

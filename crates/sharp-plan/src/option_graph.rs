@@ -159,7 +159,7 @@ fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
 }
 
 /// `π_0`: from the start to each endpoint of its own state, and to the centroids next door, so that
-/// nobody has to drive back to a centroid first; straight to the goal if it lies in the same state.
+/// nobody has to drive back to a centroid first; and straight to the goal.
 fn first_legs(
     states: &dyn StateAbstraction,
     options: &OptionSet,
@@ -169,10 +169,8 @@ fn first_legs(
     let heading = Some(start.heading);
     let leg = |id, to, end| UnguidedOption { id, from, to, start: start.position, end, heading };
     let mut legs = Vec::new();
-    if from == goal_state {
-        let option = leg(LegId::Direct, goal_state, goal.position);
-        legs.push(Candidate { option, is_bypass: false, endpoint: None });
-    }
+    let direct = leg(LegId::Direct, goal_state, goal.position);
+    legs.push(Candidate { option: direct, is_bypass: false, endpoint: None });
     for endpoint_id in endpoints_near(states, options, from) {
         let endpoint = options.endpoint(endpoint_id);
         let to = other_state(&endpoint.states, from);

@@ -9,14 +9,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_drive::World;
-use sharp_guide::{Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace};
+use sharp_drive::{ProfiledFollower, SpeedProfile, World};
+use sharp_guide::{Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption};
 use sharp_options::OptionId;
 use sharp_rbvd::{StateAbstraction, StateId};
+use sharp_sim::NoiseModel;
 use sharp_space::{Cell, Point, Seed, trig};
 
 use crate::abstraction::Abstraction;
-use crate::method::{Method, SearchSettings};
+use crate::method::{Method, PriceRule, SearchSettings};
 use crate::option_graph::{Candidate, OptionGraph};
 use crate::query::{Monitor, Phase, Query};
 
@@ -38,6 +39,12 @@ pub struct Search<'a> {
     query: Query,
     graph: OptionGraph,
     guided: BTreeMap<LegId, Result<Arc<GuidedOption>, NoGuide>>,
+    /// How fast a robot of this kind drives under the noise of the problem.
+    profile: SpeedProfile,
+    /// What guided options cost before they are measured, seconds.
+    prices: BTreeMap<LegId, f64>,
+    /// Whether a plan may go from start to goal without any option though they lie in different states.
+    offers_direct: bool,
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
     charges: BTreeMap<(LegId, LegId), f64>,
     seed: Seed,
@@ -56,7 +63,7 @@ pub enum Unplaced {
 }
 
 impl<'a> Search<'a> {
-    /// A search for `query`, as `method` says; `known` are guides from earlier problems.
+    /// A search for `query` under `noise`, as `method` says; `known` are guides from earlier problems.
     ///
     /// # Errors
     /// Names the end of the query that lies in no abstract state (Algorithm 1, line 8).
@@ -64,6 +71,7 @@ impl<'a> Search<'a> {
         world: &'a World,
         abstraction: &Abstraction,
         method: &'a Method,
+        noise: &NoiseModel,
         query: Query,
         known: impl IntoIterator<Item = (LegId, GuidePath)>,
         seed: Seed,
@@ -80,16 +88,27 @@ impl<'a> Search<'a> {
             query,
             graph,
             guided: BTreeMap::new(),
+            profile: ProfiledFollower::tuned(&world.robot, noise).speed,
+            prices: BTreeMap::new(),
+            offers_direct: false,
             charges: BTreeMap::new(),
             seed,
         };
         for (id, guide) in known {
             if let Some(candidate) = this.graph.candidate(id) {
                 let option = this.guided(candidate, guide);
-                this.guided.insert(id, Ok(Arc::new(option)));
+                this.keep(id, Ok(Arc::new(option)));
             }
         }
         Ok(this)
+    }
+
+    /// From now on a plan may go from start to goal without any option, through all states, if the method allows it:
+    /// what a motion planner would do that knows no options. Returns false if nothing changes.
+    pub fn offer_direct(&mut self) -> bool {
+        let is_new = self.settings.direct && !self.offers_direct;
+        self.offers_direct |= is_new;
+        is_new
     }
 
     /// Makes all plans in which `after` follows `before` cost `seconds` more: a hand-over that was seen to fail.
@@ -97,28 +116,37 @@ impl<'a> Search<'a> {
         self.charges.insert((before, after), seconds);
     }
 
-    /// The cheapest plan of guided options, or `None`. `measured` knows what learnt options cost, seconds.
+    /// The cheapest plan of guided options with its cost in seconds, or `None`. `measured` knows what learnt options cost, seconds.
     pub fn plan(
         &mut self,
         measured: &dyn Fn(LegId) -> Option<f64>,
         monitor: &dyn Monitor,
-    ) -> Option<Vec<Arc<GuidedOption>>> {
+    ) -> Option<(f64, Vec<Arc<GuidedOption>>)> {
         loop {
             monitor.phase(Phase::Search);
-            let ids = self.cheapest(measured)?;
+            let (cost_s, ids) = self.cheapest(measured)?;
             let missing: Vec<LegId> =
                 ids.iter().copied().filter(|id| !self.guided.contains_key(id)).collect();
             if missing.is_empty() {
-                return ids.iter().map(|id| self.guided[id].clone().ok()).collect();
+                let options: Option<_> = ids.iter().map(|id| self.guided[id].clone().ok()).collect();
+                return options.map(|options| (cost_s, options));
             }
             monitor.phase(Phase::Guide);
             let guided: Vec<_> = missing.par_iter().map(|&id| (id, self.guide(id))).collect();
-            self.guided.extend(guided);
+            guided.into_iter().for_each(|(id, option)| self.keep(id, option));
         }
     }
 
-    /// The names of the cheapest plan by what is known now.
-    fn cheapest(&self, measured: &dyn Fn(LegId) -> Option<f64>) -> Option<Vec<LegId>> {
+    /// Notes the guide of the option called `id`, or that it has none.
+    fn keep(&mut self, id: LegId, option: Result<Arc<GuidedOption>, NoGuide>) {
+        if let Ok(option) = &option {
+            self.prices.insert(id, self.settings.price_with(&self.profile, self.world, &option.guide));
+        }
+        self.guided.insert(id, option);
+    }
+
+    /// The cost and the names of the cheapest plan by what is known now.
+    fn cheapest(&self, measured: &dyn Fn(LegId) -> Option<f64>) -> Option<(f64, Vec<LegId>)> {
         let top_speed = self.world.robot.max_speed_mps;
         let cost = |option: &Candidate| self.cost_s(option, measured(option.id()));
         let charge = |before: &Candidate, after: &Candidate| {
@@ -131,7 +159,7 @@ impl<'a> Search<'a> {
             self.hand_over_s(before, after).min(HARD_HAND_OVER_S) + charge(before, after)
         };
         let found = self.graph.search(top_speed, cost, strict);
-        found.or_else(|| self.graph.search(top_speed, cost, lenient)).map(|(_, ids)| ids)
+        found.or_else(|| self.graph.search(top_speed, cost, lenient))
     }
 
     /// The option called `id` with a guide of its own, if it was guided.
@@ -144,22 +172,29 @@ impl<'a> Search<'a> {
         self.guided.iter().filter_map(|(&id, option)| option.as_ref().err().map(|reason| (id, reason)))
     }
 
-    /// What `option` costs, seconds: what was measured, else the length of its guide at nominal speed, else its
-    /// straight length; infinite where it has no guide.
+    /// What `option` costs, seconds: what was measured, else the price of its guide, else what its straight length
+    /// costs at least; infinite where it has no guide.
     fn cost_s(&self, option: &Candidate, measured: Option<f64>) -> f64 {
         let settings = &self.settings;
         if !settings.bypasses && matches!(option.id(), LegId::Option(OptionId::Bypass { .. })) {
             return f64::INFINITY;
         }
-        let straight_m = option.straight_m();
-        let length_m = match self.guided.get(&option.id()) {
-            Some(Ok(guided)) => guided.guide.length_m().max(straight_m),
-            Some(Err(_)) => return f64::INFINITY,
-            None => straight_m,
-        };
+        let UnguidedOption { id, from, to, .. } = option.option;
+        if id == LegId::Direct && from != to && !self.offers_direct {
+            return f64::INFINITY;
+        }
         let top_mps = self.world.robot.max_speed_mps;
-        let least_s = straight_m / top_mps;
-        let estimated = length_m / (settings.nominal_speed * top_mps) + settings.untrained_surcharge_s;
+        let least_s = option.straight_m() / top_mps;
+        let fastest = match settings.price {
+            PriceRule::Length => settings.nominal_speed,
+            PriceRule::Profile => self.profile.cruise,
+        };
+        let price_s = match self.guided.get(&option.id()) {
+            Some(Ok(_)) => self.prices[&option.id()].max(least_s / fastest),
+            Some(Err(_)) => return f64::INFINITY,
+            None => least_s / fastest,
+        };
+        let estimated = price_s + settings.untrained_surcharge_s;
         let bypass_s = if option.is_bypass { settings.bypass_surcharge_s } else { 0.0 };
         let measured = measured.filter(|_| settings.cost_update);
         measured.map_or(estimated, |seconds| seconds.max(least_s)) + bypass_s
@@ -251,8 +286,8 @@ mod tests {
         measured: &dyn Fn(LegId) -> Option<f64>,
     ) -> Option<Vec<Arc<GuidedOption>>> {
         let method = Method { search: settings, ..Method::fast() };
-        let search = Search::new(world, abstraction, &method, query, [], Seed(1));
-        search.expect("both ends have a state").plan(measured, &())
+        let search = Search::new(world, abstraction, &method, &NoiseModel::nominal(), query, [], Seed(1));
+        search.expect("both ends have a state").plan(measured, &()).map(|(_, plan)| plan)
     }
 
     fn unmeasured(_: LegId) -> Option<f64> {
@@ -268,14 +303,14 @@ mod tests {
     fn a_hand_over_that_was_seen_to_fail_sends_the_plan_the_other_way_round() {
         let (world, abstraction) = world(RING, OptionKind::Interface);
         let method = Method::fast();
-        let search = Search::new(&world, &abstraction, &method, round(), [], Seed(1));
+        let search = Search::new(&world, &abstraction, &method, &NoiseModel::nominal(), round(), [], Seed(1));
         let mut search = search.expect("both ends have a state");
-        let first = search.plan(&unmeasured, &()).expect("two ways lead round");
+        let (_, first) = search.plan(&unmeasured, &()).expect("two ways lead round");
         let ids = |options: &[Arc<GuidedOption>]| options.iter().map(|o| o.id).collect::<Vec<_>>();
         for pair in ids(&first).windows(2) {
             search.charge(pair[0], pair[1], 1000.0);
         }
-        let second = search.plan(&unmeasured, &()).expect("the other way");
+        let (_, second) = search.plan(&unmeasured, &()).expect("the other way");
         let before = ids(&first);
         let kept = ids(&second).windows(2).any(|pair| before.windows(2).any(|joined| joined == pair));
         assert!(!kept, "{} keeps a hand-over of {}", names(&second), names(&first));
@@ -363,8 +398,9 @@ mod tests {
         let known = straight((from.x, from.y), (to.x, to.y));
         let guides = [(LegId::Option(spec.id), known.clone())];
         let method = Method::fast();
-        let search = Search::new(&world, &abstraction, &method, along(), guides, Seed(1));
-        let options = search.expect("both ends have a state").plan(&unmeasured, &()).expect("a way");
+        let search =
+            Search::new(&world, &abstraction, &method, &NoiseModel::nominal(), along(), guides, Seed(1));
+        let (_, options) = search.expect("both ends have a state").plan(&unmeasured, &()).expect("a way");
         let option = options.iter().find(|option| option.id == LegId::Option(spec.id)).expect("on the way");
         assert_eq!(option.guide, known, "planned again");
     }
@@ -378,7 +414,10 @@ mod tests {
             assert!(none.is_none(), "{kind:?}: through a wall");
             let outside = Pose::new(-5.0, 1.0, 0.0);
             let method = Method::fast();
-            let placed = |query| Search::new(&world.0, &world.1, &method, query, [], Seed(1)).map(|_| ());
+            let placed = |query| {
+                Search::new(&world.0, &world.1, &method, &NoiseModel::nominal(), query, [], Seed(1))
+                    .map(|_| ())
+            };
             assert_eq!(placed(Query { start: outside, ..through }), Err(Unplaced::Start), "{kind:?}");
             assert_eq!(placed(Query { goal: outside, ..through }), Err(Unplaced::Goal), "{kind:?}");
         }

@@ -86,8 +86,8 @@ pub(crate) fn along() -> Query {
 /// The guided options of the cheapest plan for `query`.
 pub(crate) fn options(world: &World, abstraction: &Abstraction, query: Query) -> Vec<Arc<GuidedOption>> {
     let method = Method::fast();
-    let search = Search::new(world, abstraction, &method, query, [], Seed(1));
-    search.expect("both ends have a state").plan(&|_| None, &()).expect("there is a way")
+    let search = Search::new(world, abstraction, &method, &NoiseModel::nominal(), query, [], Seed(1));
+    search.expect("both ends have a state").plan(&|_| None, &()).expect("there is a way").1
 }
 
 /// A straight guide from `from` to `to`.

@@ -80,8 +80,9 @@ pub fn training_routes(
     let search = SearchSettings { bypasses: false, ..SearchSettings::default() };
     let method = Method { search, ..Method::default() };
     let route = |query: &Query| {
-        let mut search = Search::new(world, abstraction, &method, *query, [], seed).ok()?;
-        let options = search.plan(&|_| None, &())?;
+        let mut search =
+            Search::new(world, abstraction, &method, &NoiseModel::nominal(), *query, [], seed).ok()?;
+        let (_, options) = search.plan(&|_| None, &())?;
         let states = options
             .iter()
             .map(|option| InitialStates::of_option(world, option, query.start, STATE_POOL, seed))

@@ -132,9 +132,9 @@ impl SuiteSelection {
             for robot in chosen("robots", &self.robots, self.suite.robots())? {
                 for noise in &self.noise {
                     let inputs = Inputs::read(&env, &robot, noise, Some(&self.regions))?;
-                    let place = Place { env: &env, robot: &robot, noise, problems: &problems, inputs };
+                    let world = SuiteWorld { env: &env, robot: &robot, noise, problems: &problems, inputs };
                     for trial in 0..self.trials.unwrap_or(self.suite.trials()) {
-                        let system = |system: &System| self.experiment(&place, trial, system.clone());
+                        let system = |system: &System| self.experiment(&world, trial, system.clone());
                         experiments.extend(systems.iter().map(system));
                     }
                 }
@@ -143,20 +143,20 @@ impl SuiteSelection {
         Ok(experiments)
     }
 
-    fn experiment(&self, place: &Place<'_>, trial: u32, system: System) -> Experiment {
-        let regions = place.inputs.regions.clone().filter(|_| system.sharp().is_some());
+    fn experiment(&self, world: &SuiteWorld<'_>, trial: u32, system: System) -> Experiment {
+        let regions = world.inputs.regions.clone().filter(|_| system.sharp().is_some());
         Experiment {
             version: version().to_owned(),
-            env: place.env.to_owned(),
-            robot: place.robot.to_owned(),
+            env: world.env.to_owned(),
+            robot: world.robot.to_owned(),
             system,
-            noise: place.noise.to_owned(),
+            noise: world.noise.to_owned(),
             trial,
             seed: trial_seed(self.seed, trial),
             episodes: self.episodes,
-            problems: place.problems.to_vec(),
+            problems: world.problems.to_vec(),
             time_limit_s: self.time_limit_s,
-            inputs: Inputs { regions, ..place.inputs.clone() },
+            inputs: Inputs { regions, ..world.inputs.clone() },
         }
     }
 
@@ -217,7 +217,7 @@ impl SuiteSelection {
 }
 
 /// Where all systems are measured beside each other.
-struct Place<'a> {
+struct SuiteWorld<'a> {
     env: &'a str,
     robot: &'a str,
     noise: &'a str,
