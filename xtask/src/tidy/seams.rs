@@ -5,11 +5,12 @@ use super::code::{is_example, plain, words};
 use crate::tree::Tree;
 
 /// The traits, each with the crate that owns it.
-const SEAMS: [(&str, &str); 13] = [
+const SEAMS: [(&str, &str); 14] = [
     ("sharp-space", "CollisionChecker"),
     ("sharp-space", "RobotGeometry"),
     ("sharp-space", "RegionDetector"),
     ("sharp-rl", "Environment"),
+    ("sharp-rl", "BatchEnvironment"),
     ("sharp-rl", "Learner"),
     ("sharp-sim", "Simulator"),
     ("sharp-rbvd", "StateAbstraction"),
