@@ -19,12 +19,17 @@ pub mod conformance;
 mod baselines;
 mod contender;
 mod evaluation;
+mod prior;
 mod result;
 mod times;
 
 pub use baselines::{FlatSac, Mpc, RoutePlanner, Rrt, SacBudget, Track};
 pub use contender::{ComparisonSettings, Composed, Contender, Driven, compare};
 pub use evaluation::{ReportError, ReportInput, table, totals, write_report};
+pub use prior::{
+    HELD_OUT, PolicyScore, PriorCourses, PriorEnd, PriorProgress, PriorRecipe, PriorStage, PriorTrainError,
+    prior_candidates, score_policies, train_prior,
+};
 pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
 };

@@ -63,21 +63,24 @@ const ROOMS: [Room; 16] = [
     ),
     // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
     room(5, "sharp-draw", &["sharp-space"], &[]),
-    // Reports of suites have figures.
+    // Reports of suites have figures. Priors are trained on generated maps.
     room(
         5,
         "sharp-bench",
         &[
             "sharp-space",
+            "sharp-maps",
             "sharp-sim",
             "sharp-motion",
+            "sharp-regions",
+            "sharp-options",
             "sharp-guide",
             "sharp-rl",
             "sharp-drive",
             "sharp-plan",
             "sharp-draw",
         ],
-        &["sharp-maps"],
+        &[],
     ),
     room(6, "sharp-cli", LIBRARIES, LIBRARIES),
     room(6, "sharp-tests", LIBRARIES, LIBRARIES),
