@@ -279,7 +279,7 @@ impl RunningTask {
 #[cfg(test)]
 mod tests {
     use sharp_guide::{ProgressReward, PseudoReward};
-    use sharp_rl::conformance::check_environment;
+    use sharp_rl::conformance::{check_batch, check_environment};
     use sharp_sim::SimulatorKind;
 
     use super::*;
@@ -363,5 +363,58 @@ mod tests {
             }
         }
         assert_eq!(paid as usize, options.len(), "each termination set is paid for");
+    }
+
+    /// Slots that drive from the start of the hall, with this share of the horizon.
+    fn batch(horizon_share: f64, slots: usize) -> DrivingBatch {
+        let (world, options) = (hall(), hall_options());
+        let (interface, reward) = interfaces(&world).into_iter().next().expect("two");
+        let start = RobotState::at_rest(options[0].guide.start());
+        let simulator = world.simulator(SimulatorKind::Kinematic);
+        let (noise, links) = (NoiseModel::harsh(), Link::chain(&options).into());
+        let scenario = Scenario { world, simulator, noise, links, interface, reward, horizon_share, start };
+        let states = Arc::new(InitialStates::exactly(start));
+        DrivingBatch::new(Arc::new(SingleOption { scenario, states }), slots, Seed(1))
+    }
+
+    #[test]
+    fn slots_of_a_batch_do_not_depend_on_each_other() {
+        let (mut together, mut alone) = (batch(1.0, 40), batch(1.0, 40));
+        let checked = check_batch((&mut together, &mut alone), &mut Seed(1).stream("check", 0));
+        assert_eq!(checked, Ok(()));
+    }
+
+    #[test]
+    fn a_batch_drives_as_a_single_task_does() {
+        let mut batch = batch(1.0, 1);
+        let mut single = OptionTask::new(Arc::clone(&batch.source), Seed(1));
+        let mut seen = SeenBatch::new(&batch.spec());
+        let mut observation = vec![0.0; seen.observations.len()];
+        batch.reset(0, &mut Seed(2).stream("reset", 0), &mut seen);
+        single.reset(&mut Seed(2).stream("reset", 0), &mut observation);
+        let mut steps = [BatchStep::default()];
+        while !steps[0].is_last() {
+            let used = seen.privileged[5];
+            batch.step(0..1, &[0.3, 0.1], &mut seen, &mut steps);
+            let step = single.step(&[0.3, 0.1], &mut observation);
+            assert_eq!((step.reward, step.success), (steps[0].reward, steps[0].success));
+            assert_eq!(observation, seen.observations, "the same is seen");
+            assert!(seen.privileged[5] > used || seen.privileged[4] < 1.0, "time or options pass");
+        }
+    }
+
+    #[test]
+    fn who_uses_up_the_horizon_has_failed() {
+        let mut batch = batch(0.02, 1);
+        let mut seen = SeenBatch::new(&batch.spec());
+        batch.reset(0, &mut Seed(2).stream("reset", 0), &mut seen);
+        let mut steps = [BatchStep::default()];
+        let mut count = 0;
+        while !steps[0].is_last() {
+            batch.step(0..1, &[-1.0, 0.0], &mut seen, &mut steps);
+            count += 1;
+        }
+        assert!(steps[0].failed && !steps[0].success, "{:?}", steps[0]);
+        assert!(count < 5, "{count} actions");
     }
 }

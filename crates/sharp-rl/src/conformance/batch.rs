@@ -89,8 +89,8 @@ pub fn check_batch<B: BatchEnvironment>(
     }
     let mut steps = vec![BatchStep::default(); slots];
     for step in 0..=STEPS {
-        for slot in 0..slots {
-            check_slot(&seen, &steps[slot], (slot, step), slots)?;
+        for (slot, found) in steps.iter().enumerate() {
+            check_slot(&seen, found, (slot, step), slots)?;
             if seen != seen_alone {
                 return Err(BatchViolation::SlotsDepend { slot, step });
             }

@@ -2,9 +2,9 @@
 //!
 //! With the temporal difference δₜ = rₜ + γ V(sₜ₊₁) - V(sₜ) the advantage is Aₜ = δₜ + γ λ Aₜ₊₁, and Aₜ + V(sₜ) is
 //! what the critic should have said. The head of failures has γ = 1 and a reward of 1 for a failure, so that its
-//! value is the chance of one. Together: A = A_seconds - price x A_failure.
+//! value is the chance of one. Together: A = A₁ - C A₂, where C is the price of a failure.
 
-use super::rollout::Rollout;
+use super::rollout::RolloutRows;
 use super::settings::PpoSettings;
 use crate::network::{Mlp, Tape};
 
@@ -30,7 +30,7 @@ impl Advantages {
     /// Computes all of it for `rollout`; `progress` is the share of training that is done.
     pub(crate) fn estimate(
         &mut self,
-        rollout: &Rollout,
+        rollout: &RolloutRows,
         critic: &Mlp,
         settings: &PpoSettings,
         progress: f32,
@@ -50,7 +50,7 @@ impl Advantages {
     }
 
     /// Goes through the steps of one slot, the last first.
-    fn estimate_slot(&mut self, rollout: &Rollout, settings: &PpoSettings, slot: usize, progress: f32) {
+    fn estimate_slot(&mut self, rollout: &RolloutRows, settings: &PpoSettings, slot: usize, progress: f32) {
         let discounts = [settings.gamma, 1.0];
         let mut next = self.last_values[slot];
         let mut advantage = [0.0_f32; 2];
@@ -75,7 +75,7 @@ impl Advantages {
 
     /// Gives the advantages of each bin of caution mean 0 and deviation 1: what a failure costs differs by orders of
     /// magnitude, and the careful episodes would outvote the others.
-    fn normalise(&mut self, rollout: &Rollout, bin_count: usize) {
+    fn normalise(&mut self, rollout: &RolloutRows, bin_count: usize) {
         let bin_of = |caution: f32| ((caution * bin_count as f32) as usize).min(bin_count - 1);
         let mut sums = vec![(0.0_f64, 0.0_f64, 0.0_f64); bin_count];
         for (advantage, step) in self.actions.iter().zip(&rollout.steps) {
@@ -127,21 +127,21 @@ mod tests {
     }
 
     /// One slot in which `steps` happened.
-    fn rollout(steps: Vec<BatchStep>) -> Rollout {
+    fn rollout(steps: Vec<BatchStep>) -> RolloutRows {
         let lengths = EnvironmentSpec { observation_len: 1, action_len: 1 };
         let spec = BatchSpec { slots: 1, lengths, privileged_len: 0 };
         let cut_rows: Vec<usize> = (0..steps.len()).filter(|&i| steps[i].truncated).collect();
-        Rollout {
+        RolloutRows {
             inputs: vec![0.0; steps.len()],
             last_inputs: vec![0.0],
             cut_inputs: vec![0.0; cut_rows.len()],
             cut_rows,
             steps,
-            ..Rollout::new(spec)
+            ..RolloutRows::new(spec)
         }
     }
 
-    fn estimate(rollout: &Rollout, value: f32, lambda: f32) -> Advantages {
+    fn estimate(rollout: &RolloutRows, value: f32, lambda: f32) -> Advantages {
         let settings = PpoSettings::default().with(|s| {
             s.gamma = 0.5;
             s.lambda = lambda;

@@ -1,12 +1,12 @@
 //! Losses of proximal policy optimisation and their gradients on one minibatch.
 //!
-//! Actor, with the ratio ρ = π(a|s) / π_old(a|s) and the advantage A: -mean min(ρ A, clip(ρ, 1 - ε, 1 + ε) A). The
-//! policy is normal around m = tanh μ(s) with a deviation σ that is given, so log ρ = ((a - m_old)² - (a - m)²) / 2σ²
-//! and ∂ρ/∂μ = ρ (a - m) / σ² (1 - m²). Critic: ½ mean (V - y)² for the reward, and the cross-entropy of the chance
-//! of failure, whose derivative is p - y.
+//! Actor, with the ratio ρ = π(a|s) / π′(a|s) to the policy π′ that collected, and the advantage A:
+//! -mean min(ρ A, clip(ρ, 1 - ε, 1 + ε) A). The policy is normal around m = tanh μ(s) with a deviation σ that is given,
+//! so log ρ = ((a - m′)² - (a - m)²) / 2σ² and ∂ρ/∂μ = ρ (a - m) / σ² (1 - m²). Critic: ½ mean (V - y)² for the reward,
+//! and the cross-entropy of the chance of failure, whose derivative is p - y.
 
 use super::advantages::{Advantages, sigmoid};
-use super::rollout::Rollout;
+use super::rollout::RolloutRows;
 use super::state::PpoState;
 use crate::network::{Mlp, Tape};
 
@@ -79,7 +79,7 @@ impl PpoGradients {
     pub(crate) fn compute(
         &mut self,
         state: &PpoState,
-        (rollout, advantages): (&Rollout, &Advantages),
+        (rollout, advantages): (&RolloutRows, &Advantages),
         rows: &[usize],
         bounds: PolicyBounds,
     ) -> MinibatchSums {
@@ -96,7 +96,7 @@ impl PpoGradients {
     }
 
     /// Copies the inputs of `rows` for both networks.
-    fn gather(&mut self, rollout: &Rollout, rows: &[usize]) {
+    fn gather(&mut self, rollout: &RolloutRows, rows: &[usize]) {
         let (critic_len, actor_len) = (rollout.spec.critic_len(), rollout.spec.lengths.observation_len);
         self.actor_inputs.clear();
         self.critic_inputs.clear();
@@ -110,7 +110,7 @@ impl PpoGradients {
     fn actor_rows(
         &mut self,
         state: &PpoState,
-        (rollout, advantages): (&Rollout, &Advantages),
+        (rollout, advantages): (&RolloutRows, &Advantages),
         (rows, scale): (&[usize], f32),
         bounds: PolicyBounds,
         sums: &mut MinibatchSums,
@@ -213,7 +213,7 @@ mod tests {
     }
 
     /// Networks with a rollout that another policy collected, and what it says about the actions.
-    fn example() -> (PpoState, Rollout, Advantages) {
+    fn example() -> (PpoState, RolloutRows, Advantages) {
         let lengths = EnvironmentSpec { observation_len: 3, action_len: 2 };
         let spec = BatchSpec { slots: 1, lengths, privileged_len: 2 };
         let settings = PpoSettings::default().with(|s| s.hidden = vec![12, 12]);
@@ -222,12 +222,12 @@ mod tests {
         state.actor.set_parameters(&values).expect("finite");
         let values = ramp(state.critic.parameters().len(), 0.9).iter().map(|v| 0.4 * v).collect::<Vec<_>>();
         state.critic.set_parameters(&values).expect("finite");
-        let rollout = Rollout {
+        let rollout = RolloutRows {
             inputs: ramp(ROWS * 5, 0.0),
             actions: ramp(ROWS * 2, 1.0),
             means: ramp(ROWS * 2, 1.1).iter().map(|v| 0.2 * v).collect(),
             steps: vec![BatchStep::default(); ROWS],
-            ..Rollout::new(spec)
+            ..RolloutRows::new(spec)
         };
         let mut advantages = Advantages::default();
         advantages.actions = ramp(ROWS, 2.0);

@@ -5,7 +5,7 @@ use rand::RngExt;
 use super::advantages::Advantages;
 use super::batch::BatchEnvironment;
 use super::gradients::{MinibatchSums, PolicyBounds, PpoGradients};
-use super::rollout::{EndedEpisodes, Rollout, Slots};
+use super::rollout::{EndedEpisodes, RolloutRows, Slots};
 use super::settings::PpoSettings;
 use super::state::PpoState;
 use crate::environment::EnvironmentSpec;
@@ -25,7 +25,7 @@ pub(crate) struct PpoRun<'a, B> {
     pub(crate) state: PpoState,
     settings: &'a PpoSettings,
     slots: Slots,
-    rollout: Rollout,
+    rollout: RolloutRows,
     advantages: Advantages,
     gradients: PpoGradients,
     order: Vec<usize>,
@@ -68,7 +68,7 @@ impl<'a, B: BatchEnvironment> PpoRun<'a, B> {
         }
         Ok(Self {
             slots,
-            rollout: Rollout::new(spec),
+            rollout: RolloutRows::new(spec),
             advantages: Advantages::default(),
             gradients: PpoGradients::new(&state),
             order: Vec::new(),

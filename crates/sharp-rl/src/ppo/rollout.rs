@@ -12,7 +12,7 @@ use crate::normaliser::Normaliser;
 
 /// Everything that was seen and done in a rollout. Rows come step by step, within a step slot by slot.
 #[derive(Debug)]
-pub(crate) struct Rollout {
+pub(crate) struct RolloutRows {
     pub(crate) spec: BatchSpec,
     /// Rows x critic inputs: the observation, then what only the critic sees; normalised after collecting.
     pub(crate) inputs: Vec<f32>,
@@ -104,7 +104,7 @@ impl Slots {
     }
 
     /// Draws an action in every slot: normal around tanh of the mean, with this `deviation`.
-    fn act(&mut self, state: &mut PpoState, deviation: f32, rollout: &mut Rollout) {
+    fn act(&mut self, state: &mut PpoState, deviation: f32, rollout: &mut RolloutRows) {
         self.actor_inputs.copy_from_slice(&self.seen.observations);
         state.actor.normaliser().apply(&mut self.actor_inputs);
         state.actor.network().forward(&self.actor_inputs, &mut self.tape);
@@ -129,7 +129,7 @@ impl Slots {
     }
 }
 
-impl Rollout {
+impl RolloutRows {
     pub(crate) fn new(spec: BatchSpec) -> Self {
         Self {
             spec,
