@@ -38,6 +38,7 @@ mod evaluation;
 mod jobs;
 mod json;
 mod measure;
+mod prior;
 mod reports;
 mod result;
 mod solve;
@@ -58,6 +59,10 @@ pub use jobs::{
 pub use json::to_json;
 pub use measure::{BaselineKind, BaselineSettings, MeasureMonitor, measure};
 pub use named::{InputError, NamedProblem};
+pub use prior::{
+    HELD_OUT, PolicyScore, PriorCourses, PriorEnd, PriorProgress, PriorRecipe, PriorStage, PriorTrainError,
+    prior_candidates, score_policies, train_prior,
+};
 pub use reports::{
     BaselineReport, BaselineTimes, MapReport, OptionReport, Predicted, RunReport, SolveReport, Verified,
 };

@@ -91,6 +91,7 @@ impl PeerTask {
             links: Arc::new([Link::new(Arc::clone(&self.option), self.next.clone())]),
             interface,
             reward,
+            horizon_share: 1.0,
             start: RobotState::at_rest(self.option.guide.start()),
         };
         OptionTask::new(Arc::new(SingleOption { scenario, states: Arc::clone(&self.states) }), seed)

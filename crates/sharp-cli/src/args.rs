@@ -352,6 +352,22 @@ pub(crate) enum PriorCommand {
     Score(PriorScore),
 }
 
+/// A recipe for a prior.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Preset {
+    Tiny,
+    Default,
+}
+
+impl Preset {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Tiny => "tiny",
+            Self::Default => "default",
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct PriorTrain {
     /// husky, limo or a robot file (.ron).
@@ -360,15 +376,9 @@ pub(crate) struct PriorTrain {
     /// The file to write, safetensors; a run that was interrupted goes on from FILE.state.
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
-    /// Number of generated maps.
-    #[arg(long, default_value_t = 180)]
-    pub(crate) maps: u32,
-    /// Environment steps [default: those of the shipped prior].
-    #[arg(long, value_name = "N")]
-    pub(crate) steps: Option<u64>,
-    /// Begin with the networks of this prior instead of fresh ones.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) from: Option<PathBuf>,
+    /// How long to train: tiny takes about a minute, default is the recipe of the shipped priors.
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    pub(crate) preset: Preset,
     /// Write learning curves for TensorBoard there, as one run [default: none].
     #[arg(long, value_name = "DIR")]
     pub(crate) tensorboard: Option<PathBuf>,
@@ -388,6 +398,9 @@ pub(crate) struct PriorScore {
     /// Episodes of each policy on each leg.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) episodes: u32,
+    /// Score the prior only, not the followers beside it.
+    #[arg(long)]
+    pub(crate) prior_only: bool,
     /// A prior's file instead of the shipped one.
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,

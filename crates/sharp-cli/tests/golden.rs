@@ -53,7 +53,7 @@ fn arithmetic() -> String {
     let mut bytes = Vec::new();
     let mut rng = Seed(1).stream("arithmetic", 0);
     for robot in [RobotModel::husky(), RobotModel::limo()] {
-        let actor = &Prior::shipped(&robot).networks().actor;
+        let actor = Prior::shipped(&robot).actor();
         let (mut scratch, mut action) = (ActorScratch::default(), [0.0; 2]);
         for _ in 0..500 {
             let length = actor.spec().observation_len;

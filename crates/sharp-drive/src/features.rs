@@ -15,14 +15,26 @@ const RAY_LENGTH_M: f64 = 2.0;
 /// Where along the guide the policy looks, metres ahead of the robot.
 const LOOK_AHEAD_M: [f64; 4] = [0.4, 0.8, 1.4, 2.2];
 /// Points of the outline at which the clearance is measured, in units of its half length and half width.
-const OUTLINE: [(f64, f64); 8] =
-    [(1.0, 1.0), (1.0, 0.0), (1.0, -1.0), (0.0, 1.0), (0.0, -1.0), (-1.0, 1.0), (-1.0, 0.0), (-1.0, -1.0)];
+const OUTLINE: [(f64, f64); 12] = [
+    (1.0, 1.0),
+    (1.0, 0.0),
+    (1.0, -1.0),
+    (0.5, 1.0),
+    (0.5, -1.0),
+    (0.0, 1.0),
+    (0.0, -1.0),
+    (-0.5, 1.0),
+    (-0.5, -1.0),
+    (-1.0, 1.0),
+    (-1.0, 0.0),
+    (-1.0, -1.0),
+];
 /// Clearance beyond which more makes no difference, metres: beside the outline, and along the guide.
 const CLEARANCE_MAX_M: [f64; 2] = [0.4, 0.8];
 
 /// Length of [`guide_features`].
 pub(crate) const GUIDE_FEATURES: usize =
-    7 + 3 * LOOK_AHEAD_M.len() + RAYS + OUTLINE.len() + 7 + PolicyContext::LEN;
+    7 + 6 * LOOK_AHEAD_M.len() + 3 + RAYS + OUTLINE.len() + 9 + PolicyContext::LEN;
 /// Length of [`absolute_features`].
 pub(crate) const ABSOLUTE_FEATURES: usize = 5;
 
@@ -40,8 +52,9 @@ impl Writer<'_> {
 /// The situation in the guide's frame; every entry is about one in size.
 ///
 /// Remaining arc, cross-track distance, heading error (sine, cosine), speed, yaw rate, steering angle; four guide
-/// points ahead (x, y in the robot's frame, clearance there); twelve rays; clearance at eight points of the
-/// outline; last displacement (3), last command (2), residuals (2); and the context (5).
+/// points ahead (x, y and heading in the robot's frame, clearance there and at the robot's left and right flank);
+/// the guide's end (x, y) and whether it is the last; twelve rays; clearance at twelve points of the outline; last
+/// displacement (3), last command (2), residuals (2), residuals of the whole episode (2); and the context (5).
 pub(crate) fn guide_features(situation: &Situation<'_>, context: &PolicyContext, features: &mut [f32]) {
     let mut to = Writer(features.iter_mut());
     put_motion(situation, &mut to);
@@ -71,14 +84,24 @@ fn put_motion(situation: &Situation<'_>, to: &mut Writer<'_>) {
 fn put_guide(situation: &Situation<'_>, to: &mut Writer<'_>) {
     let Situation { world, observation, progress, guide } = situation;
     let (field, ahead_max_m) = (world.geometry.clearance(), CLEARANCE_MAX_M[1]);
+    let (pose, half_width_m) = (&observation.state.pose, world.robot.footprint.half_width_m());
     for ahead_m in LOOK_AHEAD_M {
-        let ahead = guide.ahead(progress.arc_m + ahead_m).position;
-        let local = observation.state.pose.to_local(ahead);
+        let ahead = guide.ahead(progress.arc_m + ahead_m);
+        let local = pose.to_local(ahead.position);
         to.put(local.x.clamp(-3.0, 3.0) / 2.0);
         to.put(local.y.clamp(-3.0, 3.0) / 2.0);
-        let clearance_m = field.sample(ahead) - world.robot.footprint.inscribed_radius_m();
+        to.put(pose.heading.turn_to(ahead.heading) / std::f64::consts::PI);
+        let clearance_m = field.sample(ahead.position) - world.robot.footprint.inscribed_radius_m();
         to.put(clearance_m.clamp(0.0, ahead_max_m) / ahead_max_m);
+        for side_m in [half_width_m, -half_width_m] {
+            let flank = ahead.to_world(Vector::new(0.0, side_m));
+            to.put(field.sample(flank).clamp(0.0, ahead_max_m) / ahead_max_m);
+        }
     }
+    let end = pose.to_local(guide.current.end().position);
+    to.put(end.x.clamp(-4.0, 4.0) / 4.0);
+    to.put(end.y.clamp(-4.0, 4.0) / 4.0);
+    to.put(f64::from(u8::from(guide.next.is_none())));
 }
 
 fn put_surroundings(situation: &Situation<'_>, to: &mut Writer<'_>) {
@@ -96,7 +119,7 @@ fn put_surroundings(situation: &Situation<'_>, to: &mut Writer<'_>) {
 }
 
 fn put_memory(situation: &Situation<'_>, to: &mut Writer<'_>) {
-    let Observation { last_displacement: [dx, dy, turn], last_command, residuals, .. } =
+    let Observation { last_displacement: [dx, dy, turn], last_command, residuals, long_residuals, .. } =
         situation.observation;
     let robot = &situation.world.robot;
     to.put(dx / robot.waypoint_reach_m);
@@ -104,8 +127,10 @@ fn put_memory(situation: &Situation<'_>, to: &mut Writer<'_>) {
     to.put(*turn);
     to.put(last_command.speed_mps / robot.max_speed_mps);
     to.put(last_command.bearing_rad / std::f64::consts::PI);
-    to.put(residuals[0]);
-    to.put(residuals[1].min(2.0));
+    for [turn, share] in [residuals, long_residuals] {
+        to.put(*turn);
+        to.put(share.min(2.0));
+    }
 }
 
 /// Free length from the robot's centre along `angle_rad`, metres, by sphere tracing.

@@ -73,5 +73,5 @@ pub use route::{Replan, RouteController};
 pub use situation::{GuideProgress, GuideView, Observation, Situation};
 pub use speed_profile::{ProfiledFollower, RouteFollower, SpeedProfile};
 pub use still::StandstillDetector;
-pub use task::{OptionTask, Scenario, ScenarioSource, SingleOption};
+pub use task::{DrivingBatch, OptionTask, Scenario, ScenarioSource, SingleOption};
 pub use world::{AnyVehicle, World};

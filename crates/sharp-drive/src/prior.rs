@@ -1,13 +1,14 @@
 //! The prior: one policy per kind of robot, learnt once on many generated maps, guides and noises.
 //!
 //! An option then begins with a policy that already drives: it is evaluated as it is, at several degrees of
-//! caution, and trained further only where that falls short. The network corrects a follower in the guide's own
+//! caution, and trained further only where that falls short (`docs/algorithms/prior.md`). The network corrects a follower in the guide's own
 //! frame ([`PolicyInterface::Guide`]), so that what it learnt does not depend on the map. It is told which noise
 //! to expect and how much a contact matters ([`PolicyContext`]).
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
-use sharp_rl::{Actor, SacState, StoreError};
+use sharp_rl::{Actor, StoreError};
 use sharp_sim::{NoiseModel, RobotModel};
 
 use crate::follower::{Follower, SteeringRule};
@@ -19,39 +20,48 @@ const CAUTIONS: [f32; 3] = [0.0, CAUTION, 1.0];
 /// The degree of caution of a prior that is taken without a choice.
 const CAUTION: f32 = 0.5;
 
+/// The note in a prior's file that says what its inputs mean, and the only value that is read.
+const FORMAT_NOTE: (&str, &str) = ("prior-format", "2");
+
 /// A learnt policy for every option of a kind of robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
-    sac: SacState,
-    /// The policy alone, shared by all that are made of it.
+    /// Shared by all policies that are made of it.
     actor: Arc<Actor>,
 }
 
 impl Prior {
-    /// The prior that `sac` was trained to be.
-    #[must_use]
-    pub fn new(sac: SacState) -> Self {
-        Self { actor: Arc::new(sac.actor.clone()), sac }
+    /// The prior that `actor` was trained to be.
+    ///
+    /// # Errors
+    /// If the actor has not a prior's observation and action.
+    pub fn new(actor: Actor) -> Result<Self, StoreError> {
+        let spec = actor.spec();
+        let expected = crate::features::GUIDE_FEATURES;
+        if spec.observation_len != expected || spec.action_len != PolicyInterface::ACTION_LEN {
+            return Err(StoreError::Header(format!("a network of {spec:?}, a prior has {expected} and 2")));
+        }
+        Ok(Self { actor: Arc::new(actor) })
     }
 
     /// Reads a prior from the bytes of a safetensors file.
     ///
     /// # Errors
-    /// If the bytes are no networks of a learner, or not of a prior's observation and action.
+    /// If the bytes are no actor, or not of a prior's observation and action.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, StoreError> {
-        let sac = SacState::from_bytes(bytes)?;
-        let spec = sac.actor.spec();
-        let expected = crate::features::GUIDE_FEATURES;
-        if spec.observation_len != expected || spec.action_len != PolicyInterface::ACTION_LEN {
-            return Err(StoreError::Header(format!("networks of {spec:?}, a prior has {expected} and 2")));
+        let (actor, notes) = Actor::from_bytes(bytes)?;
+        let (name, expected) = FORMAT_NOTE;
+        match notes.get(name).map(String::as_str) {
+            Some(found) if found == expected => Self::new(actor),
+            found => Err(StoreError::Header(format!("{name} is {found:?}, expected {expected:?}"))),
         }
-        Ok(Self::new(sac))
     }
 
     /// The prior as bytes of a safetensors file.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        self.sac.to_bytes()
+        let (name, format) = FORMAT_NOTE;
+        self.actor.to_bytes(&BTreeMap::from([(name.to_owned(), format.to_owned())]))
     }
 
     /// The shipped prior for robots that move as `robot` does.
@@ -61,10 +71,10 @@ impl Prior {
         if robot.can_turn_in_place() { turning } else { steering }
     }
 
-    /// Its networks, from which an option's own training begins.
+    /// Its network, from which an option's own training begins.
     #[must_use]
-    pub const fn networks(&self) -> &SacState {
-        &self.sac
+    pub fn actor(&self) -> &Actor {
+        &self.actor
     }
 
     /// Its policies for `robot` under `noise`, the least cautious first.
@@ -79,7 +89,9 @@ impl Prior {
         self.at(CAUTION, robot, noise)
     }
 
-    fn at(&self, caution: f32, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
+    /// Its policy for `robot` under `noise` at this degree of `caution`, 0 to 1.
+    #[must_use]
+    pub fn at(&self, caution: f32, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
         let interface = prior_interface(robot, PolicyContext::new(noise, caution));
         OptionPolicy::Network(NetworkPolicy::new(interface, Arc::clone(&self.actor)))
     }
@@ -111,7 +123,7 @@ pub fn prior_interface(robot: &RobotModel, context: PolicyContext) -> PolicyInte
 
 #[cfg(test)]
 mod tests {
-    use sharp_rl::{EnvironmentSpec, SacSettings};
+    use sharp_rl::EnvironmentSpec;
     use sharp_space::Seed;
 
     use super::*;
@@ -130,8 +142,11 @@ mod tests {
     fn networks_of_another_shape_are_no_prior() {
         let spec = EnvironmentSpec { observation_len: 3, action_len: 2 };
         let mut rng = Seed(1).stream("networks", 0);
-        let bytes = SacState::new(spec, &SacSettings::fast(), &mut rng).to_bytes();
-        let error = Prior::from_bytes(&bytes).expect_err("three numbers are not enough").to_string();
+        let actor = Actor::new(spec, &[8], &mut rng);
+        let bytes = actor.to_bytes(&BTreeMap::new());
+        let error = Prior::from_bytes(&bytes).expect_err("it does not say what it sees").to_string();
+        assert!(error.contains("prior-format is None"), "{error}");
+        let error = Prior::new(actor).expect_err("three numbers are not enough").to_string();
         assert!(error.contains("observation_len: 3"), "{error}");
         assert!(Prior::from_bytes(b"nothing").is_err(), "not even networks");
     }

@@ -11,6 +11,8 @@ use crate::world::World;
 
 /// Share of the older mean that is kept from one action to the next in [`Observation::residuals`].
 const RESIDUAL_KEPT: f64 = 0.8;
+/// Actions that [`Observation::long_residuals`] reach back at most.
+const LONG_ACTIONS: u32 = 50;
 
 /// Everything that a policy may look at when it decides.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +39,11 @@ pub struct Observation {
     /// Exponential means over the actions so far: turn beyond the bearing that was commanded, radians an action,
     /// and distance driven as a share of the distance that was commanded.
     pub residuals: [f64; 2],
+    /// The same as plain means over all actions so far, or over the last [`LONG_ACTIONS`] or so: what stays the same
+    /// for an episode shows here.
+    pub long_residuals: [f64; 2],
+    /// Actions behind these means.
+    pub(crate) felt_actions: u32,
     /// The slip estimate, where the policies use it.
     pub(crate) slip: Option<SlipEstimate>,
 }
@@ -47,7 +54,15 @@ impl Observation {
     pub fn first(state: RobotState, noise: &NoiseModel) -> Self {
         let slip = Some(SlipEstimate::new(noise));
         let last_command = Command::default();
-        Self { state, last_displacement: [0.0; 3], last_command, residuals: [0.0, 1.0], slip }
+        Self {
+            state,
+            last_displacement: [0.0; 3],
+            last_command,
+            residuals: [0.0, 1.0],
+            long_residuals: [0.0, 1.0],
+            felt_actions: 0,
+            slip,
+        }
     }
 
     /// The same without a slip estimate, which takes as long as the simulation.
@@ -72,12 +87,25 @@ impl Observation {
         let commanded_m = command.speed_mps.mul_add(ActionSettings::default().action_s, 0.05);
         let now = [turn - command.bearing_rad.clamp(-1.0, 1.0), moved.norm() / commanded_m];
         let residuals = [0, 1].map(|i| RESIDUAL_KEPT * self.residuals[i] + (1.0 - RESIDUAL_KEPT) * now[i]);
+        // The first value counts like an action: one action alone says little.
+        let felt_actions = self.felt_actions + 1;
+        let weight = 1.0 / f64::from(1 + felt_actions.min(LONG_ACTIONS));
+        let long_residuals =
+            [0, 1].map(|i| self.long_residuals[i] + weight * (now[i] - self.long_residuals[i]));
         let learn = |slip: SlipEstimate| match motion.contact {
             true => slip,
             false => slip.after(&world.model, (&self.state, command), &after),
         };
         let slip = self.slip.map(learn);
-        Self { state: after, last_displacement, last_command: command, residuals, slip }
+        Self {
+            state: after,
+            last_displacement,
+            last_command: command,
+            residuals,
+            long_residuals,
+            felt_actions,
+            slip,
+        }
     }
 }
 

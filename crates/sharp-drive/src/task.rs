@@ -1,12 +1,18 @@
 //! Guided options as learning tasks: where simulator, guide and reinforcement learning meet.
+//!
+//! [`OptionTask`] is one episode at a time, for soft actor-critic. [`DrivingBatch`] is many at once, for proximal
+//! policy optimisation: there a contact or a used-up horizon is a failure of its own beside the reward, and the critic
+//! is told what the robot cannot know. Both step the same [`RunningTask`].
 
 use std::fmt::Debug;
+use std::ops::Range;
 use std::sync::Arc;
 
 use rand::RngExt;
+use rayon::prelude::*;
 use sharp_guide::{Reward, StepEvents, Transition};
-use sharp_rl::{Environment, EnvironmentSpec, Step};
-use sharp_sim::{NoiseModel, RobotState, Simulator};
+use sharp_rl::{BatchEnvironment, BatchSpec, BatchStep, Environment, EnvironmentSpec, SeenBatch, Step};
+use sharp_sim::{EpisodeBias, NoiseModel, RobotState, Simulator};
 use sharp_space::{Seed, Stream};
 
 use crate::automaton::{Automaton, Link};
@@ -31,6 +37,8 @@ pub struct Scenario {
     pub interface: PolicyInterface,
     /// What it is paid.
     pub reward: Arc<dyn Reward>,
+    /// Share of each option's horizon after which an episode ends; 1 is the rule of estimates.
+    pub horizon_share: f64,
     /// Where the robot begins.
     pub start: RobotState,
 }
@@ -95,9 +103,100 @@ impl Environment for OptionTask {
 
     fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
         let running = self.running.as_mut().expect("reset comes before step");
-        let step = running.step(action);
+        let outcome = running.step(action);
         running.observe(observation);
-        step
+        let terminated = outcome.success || outcome.collided;
+        Step { reward: outcome.reward as f32, terminated, truncated: outcome.late, success: outcome.success }
+    }
+}
+
+/// Way and options left that count as one, for the critic.
+const WAY_UNIT_M: f64 = 10.0;
+const OPTIONS_UNIT: f64 = 4.0;
+/// Slots that a thread takes at once.
+const SLOTS_MIN: usize = 16;
+
+/// Many episodes of driving side by side, for [`sharp_rl::train_ppo`].
+#[derive(Clone, Debug)]
+pub struct DrivingBatch {
+    source: Arc<dyn ScenarioSource>,
+    seed: Seed,
+    slots: Vec<Option<RunningTask>>,
+}
+
+impl DrivingBatch {
+    /// So many `slots`, each of which drives what `source` draws; episodes draw their noise from `seed`.
+    #[must_use]
+    pub fn new(source: Arc<dyn ScenarioSource>, slots: usize, seed: Seed) -> Self {
+        Self { source, seed, slots: vec![None; slots] }
+    }
+}
+
+impl BatchEnvironment for DrivingBatch {
+    fn spec(&self) -> BatchSpec {
+        let observation_len = self.source.observation_len();
+        BatchSpec {
+            slots: self.slots.len(),
+            lengths: EnvironmentSpec { observation_len, action_len: PolicyInterface::ACTION_LEN },
+            privileged_len: RunningTask::PRIVILEGED_LEN,
+        }
+    }
+
+    fn reset(&mut self, slot: usize, rng: &mut Stream, seen: &mut SeenBatch) {
+        let len = self.spec().lengths.observation_len;
+        let scenario = self.source.draw(rng);
+        let running = RunningTask::begin(scenario, self.seed, rng.random());
+        running.observe(&mut seen.observations[slot * len..][..len]);
+        let privileged = &mut seen.privileged[slot * RunningTask::PRIVILEGED_LEN..];
+        running.reveal(&mut privileged[..RunningTask::PRIVILEGED_LEN]);
+        self.slots[slot] = Some(running);
+    }
+
+    /// Slots do not depend on each other, so that any number of threads gives the same.
+    fn step(&mut self, slots: Range<usize>, actions: &[f32], seen: &mut SeenBatch, steps: &mut [BatchStep]) {
+        let len = self.spec().lengths.observation_len;
+        let rows = |len: usize| slots.start * len..slots.end * len;
+        let observations = seen.observations[rows(len)].par_chunks_mut(len);
+        let privileged =
+            seen.privileged[rows(RunningTask::PRIVILEGED_LEN)].par_chunks_mut(RunningTask::PRIVILEGED_LEN);
+        let given = actions.par_chunks(PolicyInterface::ACTION_LEN).zip(self.slots[slots].par_iter_mut());
+        given.zip(observations.zip(privileged)).zip(steps).with_min_len(SLOTS_MIN).for_each(
+            |(((action, running), (observation, privileged)), step)| {
+                let running = running.as_mut().expect("reset comes before step");
+                *step = running.step(action).into_batch_step(&running.interface);
+                running.observe(observation);
+                running.reveal(privileged);
+            },
+        );
+    }
+}
+
+/// What came of an action.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct ActionOutcome {
+    reward: f64,
+    /// The last option is done.
+    success: bool,
+    collided: bool,
+    /// The horizon is used up, and nothing else ended the episode.
+    late: bool,
+}
+
+impl ActionOutcome {
+    fn into_batch_step(self, interface: &PolicyInterface) -> BatchStep {
+        let caution = match interface {
+            PolicyInterface::Guide { context, .. } => context.caution,
+            PolicyInterface::Absolute { .. } => 0.0,
+        };
+        let failed = self.collided || self.late;
+        BatchStep {
+            reward: self.reward as f32,
+            failed,
+            terminated: failed || self.success,
+            truncated: false,
+            success: self.success,
+            caution,
+        }
     }
 }
 
@@ -107,25 +206,49 @@ struct RunningTask {
     world: World,
     interface: PolicyInterface,
     reward: Arc<dyn Reward>,
+    horizon_share: f64,
     episode: Episode,
     automaton: Automaton,
 }
 
 impl RunningTask {
+    /// Numbers in [`Self::reveal`].
+    const PRIVILEGED_LEN: usize = 6;
+
     fn begin(scenario: Scenario, seed: Seed, number: u64) -> Self {
-        let Scenario { world, simulator, noise, links, interface, reward, start } = scenario;
+        let Scenario { world, simulator, noise, links, interface, reward, horizon_share, start } = scenario;
         let rules = EpisodeRules::default().with_contact_ends(reward.contact_ends());
         let mut episode = Episode::new(world.vehicle(&*simulator, &noise, rules.contact_ends), rules);
         episode.begin(start, seed, number);
         let automaton = Automaton::new(links, Observation::first(start, &noise).without_slip_estimate());
-        Self { world, interface, reward, episode, automaton }
+        Self { world, interface, reward, horizon_share, episode, automaton }
     }
 
     fn observe(&self, observation: &mut [f32]) {
         self.interface.observe(&self.automaton.situation(&self.world), observation);
     }
 
-    fn step(&mut self, action: &[f32]) -> Step {
+    /// What the robot cannot know: slip of speed and of turn, pull, way and options left, share of the horizon used.
+    fn reveal(&self, privileged: &mut [f32]) {
+        let EpisodeBias { speed_slip, yaw_slip, drift_radps } = self.episode.vehicle().bias();
+        let (index, links) = (self.automaton.index(), self.automaton.links());
+        let later_m: f64 = links[index + 1..].iter().map(|link| link.option.guide.length_m()).sum();
+        let way_m = self.automaton.progress().remaining_m + later_m;
+        let used = f64::from(self.automaton.actions()) / self.horizon_actions();
+        let options_left = (links.len() - 1 - index) as f64;
+        let values =
+            [speed_slip, yaw_slip, drift_radps, way_m / WAY_UNIT_M, options_left / OPTIONS_UNIT, used];
+        for (entry, value) in privileged.iter_mut().zip(values) {
+            *entry = value as f32;
+        }
+    }
+
+    /// Actions that the option that runs may take.
+    fn horizon_actions(&self) -> f64 {
+        self.horizon_share * f64::from(self.automaton.link().option.horizon_actions())
+    }
+
+    fn step(&mut self, action: &[f32]) -> ActionOutcome {
         let command = self.interface.command(&self.automaton.situation(&self.world), action);
         let motion = self.episode.act(command);
         let before = *self.automaton.progress();
@@ -133,11 +256,10 @@ impl RunningTask {
         let collided = motion.contact && self.reward.contact_ends();
         let done = !collided && self.automaton.is_done();
         let reward = self.reward(&motion, &before, done);
-        let late = self.automaton.is_late();
+        let late = f64::from(self.automaton.actions()) >= self.horizon_actions();
         // From here on the next option of the chain runs, if there is one.
         let success = done && !self.automaton.advance();
-        let terminated = success || collided;
-        Step { reward: reward as f32, terminated, truncated: !terminated && !done && late, success }
+        ActionOutcome { reward, success, collided, late: late && !done && !collided }
     }
 
     fn reward(&self, motion: &Motion, before: &GuideProgress, success: bool) -> f64 {
@@ -157,7 +279,7 @@ impl RunningTask {
 #[cfg(test)]
 mod tests {
     use sharp_guide::{ProgressReward, PseudoReward};
-    use sharp_rl::conformance::check_environment;
+    use sharp_rl::conformance::{check_batch, check_environment};
     use sharp_sim::SimulatorKind;
 
     use super::*;
@@ -185,7 +307,8 @@ mod tests {
         let start = RobotState::at_rest(links[0].option.guide.start());
         let simulator = world.simulator(SimulatorKind::Kinematic);
         let (world, links) = (world.clone(), links.into());
-        let scenario = Scenario { world, simulator, noise, links, interface, reward, start };
+        let horizon_share = 1.0;
+        let scenario = Scenario { world, simulator, noise, links, interface, reward, horizon_share, start };
         let states = Arc::new(InitialStates::exactly(start));
         OptionTask::new(Arc::new(SingleOption { scenario, states }), Seed(1))
     }
@@ -240,5 +363,58 @@ mod tests {
             }
         }
         assert_eq!(paid as usize, options.len(), "each termination set is paid for");
+    }
+
+    /// Slots that drive from the start of the hall, with this share of the horizon.
+    fn batch(horizon_share: f64, slots: usize) -> DrivingBatch {
+        let (world, options) = (hall(), hall_options());
+        let (interface, reward) = interfaces(&world).into_iter().next().expect("two");
+        let start = RobotState::at_rest(options[0].guide.start());
+        let simulator = world.simulator(SimulatorKind::Kinematic);
+        let (noise, links) = (NoiseModel::harsh(), Link::chain(&options).into());
+        let scenario = Scenario { world, simulator, noise, links, interface, reward, horizon_share, start };
+        let states = Arc::new(InitialStates::exactly(start));
+        DrivingBatch::new(Arc::new(SingleOption { scenario, states }), slots, Seed(1))
+    }
+
+    #[test]
+    fn slots_of_a_batch_do_not_depend_on_each_other() {
+        let (mut together, mut alone) = (batch(1.0, 40), batch(1.0, 40));
+        let checked = check_batch((&mut together, &mut alone), &mut Seed(1).stream("check", 0));
+        assert_eq!(checked, Ok(()));
+    }
+
+    #[test]
+    fn a_batch_drives_as_a_single_task_does() {
+        let mut batch = batch(1.0, 1);
+        let mut single = OptionTask::new(Arc::clone(&batch.source), Seed(1));
+        let mut seen = SeenBatch::new(&batch.spec());
+        let mut observation = vec![0.0; seen.observations.len()];
+        batch.reset(0, &mut Seed(2).stream("reset", 0), &mut seen);
+        single.reset(&mut Seed(2).stream("reset", 0), &mut observation);
+        let mut steps = [BatchStep::default()];
+        while !steps[0].is_last() {
+            let used = seen.privileged[5];
+            batch.step(0..1, &[0.3, 0.1], &mut seen, &mut steps);
+            let step = single.step(&[0.3, 0.1], &mut observation);
+            assert_eq!((step.reward, step.success), (steps[0].reward, steps[0].success));
+            assert_eq!(observation, seen.observations, "the same is seen");
+            assert!(seen.privileged[5] > used || seen.privileged[4] < 1.0, "time or options pass");
+        }
+    }
+
+    #[test]
+    fn who_uses_up_the_horizon_has_failed() {
+        let mut batch = batch(0.02, 1);
+        let mut seen = SeenBatch::new(&batch.spec());
+        batch.reset(0, &mut Seed(2).stream("reset", 0), &mut seen);
+        let mut steps = [BatchStep::default()];
+        let mut count = 0;
+        while !steps[0].is_last() {
+            batch.step(0..1, &[-1.0, 0.0], &mut seen, &mut steps);
+            count += 1;
+        }
+        assert!(steps[0].failed && !steps[0].success, "{:?}", steps[0]);
+        assert!(count < 5, "{count} actions");
     }
 }

@@ -69,5 +69,5 @@ pub use problem::PlanningProblem;
 pub use query::{Monitor, Phase, Query, QueryError};
 pub use search::{Search, Unplaced};
 pub use sharp::{Answer, Sharp, SolveError};
-pub use training_route::{RouteScenarios, TrainingRoute, prior_train_settings, training_routes};
+pub use training_route::{RouteScenarios, TrainingRoute, training_routes};
 pub use verify::{PlannedOption, Solution};

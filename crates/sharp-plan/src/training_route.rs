@@ -1,8 +1,9 @@
 //! What a prior is trained on: a few options in a row, of many plans in many maps.
 //!
 //! An episode begins somewhere in a plan and runs on over the hand-overs: what counts is not to finish an option
-//! but to arrive so that the next can be driven as well.
+//! but to arrive so that the next can be driven as well. The guides are joined as in plans.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rand::RngExt;
@@ -10,24 +11,24 @@ use sharp_drive::{
     Driver, InitialStates, Link, MonteCarlo, OptionPolicy, PolicyContext, PolicyInterface, Scenario,
     ScenarioSource, SuccessEstimate, World, prior_interface,
 };
-use sharp_guide::{GuidedOption, ProgressReward};
-use sharp_rl::{StopRule, TrainSettings};
-use sharp_sim::{NoiseModel, SimulatorKind};
+use sharp_guide::{GuidedOption, ProgressReward, join_guides};
+use sharp_sim::{ActionSettings, NoiseModel, SimulatorKind};
 use sharp_space::{Seed, Stream};
 
 use crate::abstraction::Abstraction;
-use crate::method::{Method, SearchSettings};
+use crate::method::{Method, PriceRule, SearchSettings};
 use crate::query::Query;
 use crate::search::Search;
 
 /// Options that an episode runs through at most.
-const OPTIONS_MAX: usize = 3;
+const OPTIONS_MAX: usize = 5;
 /// Initial states kept of each option.
 const STATE_POOL: usize = 48;
-/// Strength of the noises trained with, as shares of the built-in ones.
-const STRENGTHS: std::ops::Range<f64> = 0.5..1.1;
-/// Reward of a contact at no and at full caution.
-const CONTACT: [f64; 2] = [-3.0, -20.0];
+/// Share of an option's horizon within which it must be done: who takes longer has lost anyway.
+const HORIZON_SHARE: f64 = 0.4;
+/// Speed along the guide at which progress and time outweigh each other, as a share of the top speed. A robot that
+/// drives faster gains by every metre, and one that fails loses next to nothing of what it would have gained.
+const EVEN_SPEED: f64 = 0.7;
 
 /// A plan in a map: options that follow one another, and where each may begin.
 #[derive(Clone, Debug)]
@@ -77,12 +78,19 @@ pub fn training_routes(
     queries: &[Query],
     seed: Seed,
 ) -> Vec<TrainingRoute> {
-    let search = SearchSettings { bypasses: false, ..SearchSettings::default() };
+    // What a prior is trained on does not follow the search's prices.
+    let search = SearchSettings {
+        price: PriceRule::Length,
+        bypasses: false,
+        direct: false,
+        ..SearchSettings::default()
+    };
     let method = Method { search, ..Method::default() };
     let route = |query: &Query| {
         let mut search =
             Search::new(world, abstraction, &method, &NoiseModel::nominal(), *query, [], seed).ok()?;
         let (_, options) = search.plan(&|_| None, &())?;
+        let options = join_guides(options, query.start, &world.guide_robot(), &method.search.guide);
         let states = options
             .iter()
             .map(|option| InitialStates::of_option(world, option, query.start, STATE_POOL, seed))
@@ -97,18 +105,21 @@ pub fn training_routes(
 pub struct RouteScenarios {
     routes: Arc<Vec<TrainingRoute>>,
     noises: Arc<Vec<NoiseModel>>,
+    strengths: Range<f64>,
     simulator: SimulatorKind,
 }
 
 impl RouteScenarios {
-    /// Parts of `routes` under `noises`, in the kinematic simulator.
+    /// Parts of `routes` under `noises`, in the kinematic simulator. Each noise is scaled by a factor from
+    /// `strengths`.
     ///
     /// # Panics
-    /// If there are no routes or no noises.
+    /// If there are no routes, no noises or no strengths.
     #[must_use]
-    pub fn new(routes: Arc<Vec<TrainingRoute>>, noises: Arc<Vec<NoiseModel>>) -> Self {
-        assert!(!routes.is_empty() && !noises.is_empty(), "training needs routes and noises");
-        Self { routes, noises, simulator: SimulatorKind::Kinematic }
+    pub fn new(routes: Arc<Vec<TrainingRoute>>, noises: Arc<Vec<NoiseModel>>, strengths: Range<f64>) -> Self {
+        let is_empty = routes.is_empty() || noises.is_empty() || strengths.is_empty();
+        assert!(!is_empty, "training needs routes, noises and strengths");
+        Self { routes, noises, strengths, simulator: SimulatorKind::Kinematic }
     }
 
     /// The same in another simulator.
@@ -125,17 +136,24 @@ impl ScenarioSource for RouteScenarios {
         let first = rng.random_range(0..options.len());
         let last = (first + OPTIONS_MAX).min(options.len()) - 1;
         let noise = &self.noises[rng.random_range(0..self.noises.len())];
-        let noise = noise.scaled(rng.random_range(STRENGTHS));
-        let caution: f64 = rng.random();
-        let contact = CONTACT[0] + (CONTACT[1] - CONTACT[0]) * caution;
-        let reward = ProgressReward { contact, success: 1.0, stray: 0.0, ..ProgressReward::default() };
+        let noise = noise.scaled(rng.random_range(self.strengths.clone()));
+        let caution: f32 = rng.random();
+        let reward = ProgressReward {
+            progress_per_m: 1.0 / (EVEN_SPEED * world.robot.max_speed_mps),
+            step: -ActionSettings::default().action_s,
+            deviation_per_m: 0.0,
+            success: 0.0,
+            contact: 0.0,
+            stray: 0.0,
+        };
         let link = |index: usize| Link::new(Arc::clone(&options[index]), options.get(index + 1).cloned());
         Scenario {
             simulator: world.simulator(self.simulator),
-            interface: interface(world, PolicyContext::new(&noise, caution as f32)),
+            interface: interface(world, PolicyContext::new(&noise, caution)),
             noise,
             links: (first..=last).map(link).collect(),
             reward: Arc::new(reward),
+            horizon_share: HORIZON_SHARE,
             start: states[first].draw(rng),
             world: world.clone(),
         }
@@ -150,28 +168,12 @@ fn interface(world: &World, context: PolicyContext) -> PolicyInterface {
     prior_interface(&world.robot, context)
 }
 
-/// How a prior is trained.
-#[must_use]
-pub fn prior_train_settings() -> TrainSettings {
-    TrainSettings::fast().with(|train| {
-        train.sac.hidden = vec![128, 128];
-        train.sac.learning_rate = 5e-4;
-        train.sac.updates_per_step = 0.25;
-        train.sac.warmup_steps = 4_000;
-        train.sac.zero_last_actor_layer = true;
-        train.max_env_steps = 600_000;
-        train.evaluate_every = 20_000;
-        train.evaluation_episodes = 800;
-        train.stop = StopRule::Never;
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use sharp_drive::{OptionTask, Prior};
     use sharp_options::OptionKind;
     use sharp_rl::conformance::check_environment;
-    use sharp_rl::{Environment, SacState, evaluate};
+    use sharp_rl::{Actor, Environment, evaluate};
 
     use super::*;
     use crate::test_worlds::{HALL, along, world};
@@ -196,12 +198,14 @@ mod tests {
 
     #[test]
     fn an_episode_runs_on_over_its_hand_overs() {
-        let source = RouteScenarios::new(Arc::new(along_the_hall()), Arc::new(vec![NoiseModel::none()]));
+        let source =
+            RouteScenarios::new(Arc::new(along_the_hall()), Arc::new(vec![NoiseModel::none()]), 0.5..1.0);
         let mut task = OptionTask::new(Arc::new(source), Seed(1));
         let checked = check_environment(&mut task, &mut Seed(1).stream("check", 0));
         assert_eq!(checked, Ok(()));
         let mut rng = Seed(1).stream("networks", 0);
-        let actor = SacState::new(task.spec(), &prior_train_settings().sac, &mut rng).actor;
+        let mut actor = Actor::new(task.spec(), &[8], &mut rng);
+        actor.network_mut().zero_last_layer();
         let all = evaluate(std::slice::from_mut(&mut task), &actor, 20, &mut rng).expect("a sound task");
         assert_eq!(all.successes, 20, "without noise the base follower runs through: {all:?}");
         assert!(all.mean_steps > 12.0, "more than an option at a time: {all:?}");

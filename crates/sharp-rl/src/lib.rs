@@ -1,8 +1,10 @@
-//! Soft actor-critic on plain vectors: how an option gets its policy (Sec. 4.3).
+//! Soft actor-critic and proximal policy optimisation on plain vectors: how an option gets its policy (Sec. 4.3).
 //!
 //! * [`Environment`] is a task: `f32` vectors in, `f32` vectors out.
 //! * [`Learner`] is an algorithm that turns environments into a policy. [`SacLearner`] is soft
 //!   actor-critic; [`train`], [`fine_tune`] and [`resume`] are the same as functions.
+//! * [`BatchEnvironment`] is many episodes side by side, for proximal policy optimisation: [`train_ppo`] for tasks
+//!   with failures and with inputs that only the critic sees, [`PpoLearner`] for ordinary environments.
 //! * [`Actor`] is the policy. It decides in about a microsecond and is stored as safetensors.
 //! * [`Evaluation`] says how good a policy is.
 //!
@@ -49,6 +51,7 @@ mod matrix;
 mod n_step;
 mod network;
 mod normaliser;
+mod ppo;
 mod sac;
 mod sac_learner;
 mod sac_state;
@@ -74,6 +77,10 @@ pub use learner::{Learner, Observer, Progress, Trained};
 pub use n_step::NStep;
 pub use network::{Layer, Mlp, NetworkError, Scratch};
 pub use normaliser::{Normaliser, NormaliserError};
+pub use ppo::{
+    BatchEnvironment, BatchSpec, BatchStep, FailurePrice, PpoBudget, PpoLearner, PpoSettings, PpoState,
+    Schedule, SeenBatch, resume_ppo, train_ppo,
+};
 pub use sac::{Sac, UpdateReport};
 pub use sac_learner::{SacLearner, SacStart};
 pub use sac_state::SacState;

@@ -282,6 +282,14 @@ impl Tape {
         Self { batch, values: room.clone(), deltas: room, columns: Vec::new() }
     }
 
+    /// Makes room for another number of rows, without giving memory back.
+    pub(crate) fn resize(&mut self, sizes: &[usize], batch: usize) {
+        self.batch = batch;
+        for (values, width) in self.values.iter_mut().chain(&mut self.deltas).zip(sizes[1..].iter().cycle()) {
+            values.resize(batch * width, 0.0);
+        }
+    }
+
     /// The network's output, batch x outputs.
     pub(crate) fn output(&self) -> &[f32] {
         self.values.last().expect("a network has a layer")

@@ -33,7 +33,14 @@ impl SacState {
         if settings.zero_last_actor_layer {
             actor.network_mut().zero_last_layer();
         }
-        let sizes = layer_sizes(spec.observation_len + spec.action_len, &settings.hidden, 1);
+        Self::with_actor(actor, settings, rng)
+    }
+
+    /// Fresh critics beside `actor`, which comes from another algorithm.
+    #[must_use]
+    pub fn with_actor(actor: Actor, settings: &SacSettings, rng: &mut Stream) -> Self {
+        let EnvironmentSpec { observation_len, action_len } = actor.spec();
+        let sizes = layer_sizes(observation_len + action_len, &settings.hidden, 1);
         let critics = [Mlp::new(&sizes, rng), Mlp::new(&sizes, rng)];
         let targets = critics.clone();
         Self::assemble(actor, critics, targets, settings.initial_alpha.ln())

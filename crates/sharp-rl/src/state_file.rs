@@ -13,7 +13,7 @@ use crate::store::{StoreError, TensorReader, TensorWriter};
 
 /// A stream as text: seed and position in 32-bit words.
 #[derive(Serialize, Deserialize)]
-struct StreamRecord {
+pub(crate) struct StreamRecord {
     seed: [u8; 32],
     stream: u64,
     /// High and low half of the position.
@@ -77,10 +77,20 @@ struct TrainHeader {
 }
 
 #[derive(Serialize, Deserialize)]
-struct EpisodeHeader {
+pub(crate) struct EpisodeHeader {
     start: Option<StreamRecord>,
     stream: StreamRecord,
     action_values: usize,
+}
+
+impl From<&ReplayRecord> for EpisodeHeader {
+    fn from(record: &ReplayRecord) -> Self {
+        Self {
+            start: record.start.as_ref().map(StreamRecord::from),
+            stream: (&record.stream).into(),
+            action_values: record.actions.len(),
+        }
+    }
 }
 
 impl SacState {
@@ -117,14 +127,8 @@ impl TrainState {
         }
         write_buffer(&mut writer, &self.buffer);
         for (index, record) in self.records.iter().enumerate() {
-            writer.vector(&format!("lane.{index}.actions"), &record.actions);
-            writer.vector(&format!("lane.{index}.observation"), &record.observation);
+            write_record(&mut writer, index, record);
         }
-        let episode = |record: &ReplayRecord| EpisodeHeader {
-            start: record.start.as_ref().map(StreamRecord::from),
-            stream: (&record.stream).into(),
-            action_values: record.actions.len(),
-        };
         let header = TrainHeader {
             sac: SacHeader::new(&self.sac),
             best: self.best.as_ref().map(|best| (SacHeader::new(&best.sac), best.evaluation)),
@@ -136,7 +140,7 @@ impl TrainState {
             buffer_len: self.buffer.len(),
             buffer_next: self.buffer.next,
             rngs: [&self.action_rng, &self.batch_rng, &self.evaluation_rng].map(StreamRecord::from),
-            records: self.records.iter().map(episode).collect(),
+            records: self.records.iter().map(EpisodeHeader::from).collect(),
         };
         writer.finish(Self::KIND, &header)
     }
@@ -214,12 +218,17 @@ fn read_sac(reader: &TensorReader<'_>, prefix: &str, header: &SacHeader) -> Resu
     })
 }
 
-fn write_adam(writer: &mut TensorWriter, name: &str, adam: &Adam) {
+pub(crate) fn write_adam(writer: &mut TensorWriter, name: &str, adam: &Adam) {
     writer.vector(&format!("{name}.adam.first"), &adam.first);
     writer.vector(&format!("{name}.adam.second"), &adam.second);
 }
 
-fn read_adam(reader: &TensorReader<'_>, name: &str, len: usize, steps: u64) -> Result<Adam, StoreError> {
+pub(crate) fn read_adam(
+    reader: &TensorReader<'_>,
+    name: &str,
+    len: usize,
+    steps: u64,
+) -> Result<Adam, StoreError> {
     Ok(Adam {
         first: reader.floats(&format!("{name}.adam.first"), &[len])?,
         second: reader.floats(&format!("{name}.adam.second"), &[len])?,
@@ -264,7 +273,13 @@ fn read_buffer(
     })
 }
 
-fn read_record(
+/// Writes the unfinished episode of environment `index`, all but its header.
+pub(crate) fn write_record(writer: &mut TensorWriter, index: usize, record: &ReplayRecord) {
+    writer.vector(&format!("lane.{index}.actions"), &record.actions);
+    writer.vector(&format!("lane.{index}.observation"), &record.observation);
+}
+
+pub(crate) fn read_record(
     reader: &TensorReader<'_>,
     index: usize,
     header: EpisodeHeader,

@@ -1,9 +1,12 @@
-//! Two small environments that a learner solves within seconds, for tests and examples.
+//! Small environments that a learner solves within seconds, for tests and examples.
+
+use std::ops::Range;
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 
 use crate::environment::{Environment, EnvironmentSpec, Step, Stream};
+use crate::ppo::{BatchEnvironment, BatchSpec, BatchStep, SeenBatch};
 
 /// The best action repeats the observation; the reward is minus the squared difference.
 #[derive(Clone, Debug)]
@@ -108,5 +111,49 @@ impl Environment for PointMass {
         let success = self.distance() < 0.15;
         let reward = before - self.distance() - 0.02 + if success { 1.0 } else { 0.0 };
         Step { reward, terminated: success, truncated: !success && self.steps_left == 0, success }
+    }
+}
+
+/// Episodes along a ledge, side by side: speed pays, and a fast step fails with a chance of one in ten.
+///
+/// Half of the episodes have caution 0, the others [`Self::caution_max`]. The actor sees the caution; the critic is told
+/// a constant. An episode ends with a failure, or well with a chance of one in ten at each step.
+#[derive(Clone, Debug)]
+pub struct Ledge {
+    /// Caution of the careful episodes; 1 in a sound environment.
+    pub caution_max: f32,
+    cautions: Vec<f32>,
+    streams: Vec<Stream>,
+}
+
+impl Ledge {
+    /// So many `slots`.
+    #[must_use]
+    pub fn new(slots: usize) -> Self {
+        Self { caution_max: 1.0, cautions: vec![0.0; slots], streams: vec![Stream::seed_from_u64(0); slots] }
+    }
+}
+
+impl BatchEnvironment for Ledge {
+    fn spec(&self) -> BatchSpec {
+        let lengths = EnvironmentSpec { observation_len: 1, action_len: 1 };
+        BatchSpec { slots: self.cautions.len(), lengths, privileged_len: 1 }
+    }
+
+    fn reset(&mut self, slot: usize, rng: &mut Stream, seen: &mut SeenBatch) {
+        self.streams[slot] = Stream::from_rng(rng);
+        self.cautions[slot] = if self.streams[slot].random::<bool>() { self.caution_max } else { 0.0 };
+        seen.observations[slot] = 2.0 * self.cautions[slot] - 1.0;
+        seen.privileged[slot] = 0.5;
+    }
+
+    fn step(&mut self, slots: Range<usize>, actions: &[f32], _seen: &mut SeenBatch, steps: &mut [BatchStep]) {
+        for (slot, (action, step)) in slots.zip(actions.iter().zip(steps)) {
+            let risk = 0.1 * (0.5 + 0.5 * action);
+            let failed = self.streams[slot].random::<f32>() < risk;
+            let terminated = failed || self.streams[slot].random::<f32>() < 0.1;
+            let caution = self.cautions[slot];
+            *step = BatchStep { reward: *action, failed, terminated, caution, ..BatchStep::default() };
+        }
     }
 }

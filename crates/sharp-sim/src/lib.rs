@@ -49,7 +49,9 @@ pub mod conformance;
 pub use controller::{Aim, WaypointController};
 pub use description::SyntaxError;
 pub use kinematic::KinematicSim;
-pub use noise::{ActionNoise, EpisodeNoise, NoiseError, NoiseModel, STEER_PER_DRIFT_S, SlipperyPatches};
+pub use noise::{
+    ActionNoise, EpisodeBias, EpisodeNoise, NoiseError, NoiseModel, STEER_PER_DRIFT_S, SlipperyPatches,
+};
 pub use obstacle_map::{ObstacleMap, Wall};
 pub use planar::PlanarSim;
 #[cfg(feature = "rigid3d")]

@@ -186,6 +186,17 @@ impl NoiseModel {
     }
 }
 
+/// What stays the same for an episode and nobody tells the robot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EpisodeBias {
+    /// Share of the speed that is lost.
+    pub speed_slip: f64,
+    /// Share of the turn that is lost.
+    pub yaw_slip: f64,
+    /// Pull to one side at 1 m/s, rad/s, left positive.
+    pub drift_radps: f64,
+}
+
 /// The noise of one episode.
 #[derive(Clone, Debug)]
 pub struct EpisodeNoise {
@@ -219,6 +230,13 @@ impl EpisodeNoise {
         let bias = if stream.random::<bool>() { model.drift_bias_radps } else { -model.drift_bias_radps };
         let drift_radps = model.drift_sd_radps * drift + bias;
         Self { model: model.clone(), key, speed_slip, yaw_slip, drift_radps }
+    }
+
+    /// Slip and pull of the episode.
+    #[must_use]
+    pub const fn bias(&self) -> EpisodeBias {
+        let Self { speed_slip, yaw_slip, drift_radps, .. } = *self;
+        EpisodeBias { speed_slip, yaw_slip, drift_radps }
     }
 
     /// The noise of action number `action`; the same at every call.

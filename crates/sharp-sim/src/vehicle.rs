@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use sharp_space::{Point, Seed};
 
 use crate::controller::WaypointController;
-use crate::noise::{ActionNoise, EpisodeNoise, NoiseModel};
+use crate::noise::{ActionNoise, EpisodeBias, EpisodeNoise, NoiseModel};
 use crate::robot::{Drive, RobotModel};
 use crate::simulator::Simulator;
 use crate::state::{RobotState, WheelCommand};
@@ -190,6 +190,11 @@ impl<S: Simulator> Vehicle<S> {
     /// The noise that episodes are drawn from.
     pub fn noise(&self) -> &NoiseModel {
         &self.model
+    }
+
+    /// Slip and pull of the episode that runs: what a critic may know and a robot may not.
+    pub fn bias(&self) -> EpisodeBias {
+        self.noise.bias()
     }
 
     /// How actions are timed.

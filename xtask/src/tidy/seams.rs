@@ -10,6 +10,7 @@ const SEAMS: [(&str, &str); 14] = [
     ("sharp-space", "RobotGeometry"),
     ("sharp-space", "RegionDetector"),
     ("sharp-rl", "Environment"),
+    ("sharp-rl", "BatchEnvironment"),
     ("sharp-rl", "Learner"),
     ("sharp-sim", "Simulator"),
     ("sharp-rbvd", "StateAbstraction"),

@@ -56,6 +56,7 @@ fn scenario(task: &LearningTask<'_>, training: &NetworkTraining<'_>) -> Scenario
         links: Arc::new([Link::new(Arc::clone(task.option), task.next.cloned())]),
         interface: training.interface,
         reward: Arc::clone(&training.reward),
+        horizon_share: 1.0,
         start: RobotState::at_rest(task.option.guide.start()),
     }
 }

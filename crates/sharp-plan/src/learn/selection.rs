@@ -8,7 +8,7 @@ use sharp_drive::{
     prior_interface,
 };
 use sharp_guide::ProgressReward;
-use sharp_rl::{Exploration, SacLearner, SacStart, StopRule, TrainSettings};
+use sharp_rl::{Exploration, SacLearner, SacStart, SacState, StopRule, TrainSettings};
 use sharp_sim::NoiseModel;
 
 use super::network::{NetworkTraining, train_network};
@@ -17,6 +17,8 @@ use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLea
 /// Rounds of successive halving: the share of the screening episodes that each candidate drives, and how many
 /// candidates go on. Those that the last round leaves are compared on all episodes.
 const ROUNDS: [(f64, usize); 3] = [(0.1, 10), (0.3, 5), (1.0, 3)];
+/// Widths of the prior's hidden layers.
+const PRIOR_HIDDEN: [usize; 2] = [128, 128];
 /// Reward of a contact while a prior is trained on: what it was trained with at full caution.
 const FINE_CONTACT: f64 = -20.0;
 
@@ -42,13 +44,11 @@ impl Default for Selection {
             train_below: 0.97,
             // Few steps: the prior drives already, and what it has not learnt then it hardly will.
             train: TrainSettings::fast().with(|train| {
-                train.sac = crate::training_route::prior_train_settings().sac.with(|sac| {
-                    sac.learning_rate = 3e-4;
-                    sac.updates_per_step = 0.25;
-                    sac.warmup_steps = 1_000;
-                    sac.exploration = Exploration::Policy;
-                    sac.zero_last_actor_layer = false;
-                });
+                train.sac.hidden = PRIOR_HIDDEN.to_vec();
+                train.sac.learning_rate = 3e-4;
+                train.sac.updates_per_step = 0.25;
+                train.sac.warmup_steps = 1_000;
+                train.sac.exploration = Exploration::Policy;
                 train.max_env_steps = 12_000;
                 train.evaluate_every = 2_000;
                 train.stop = StopRule::Success { rate: 0.995, episodes: 400 };
@@ -161,8 +161,10 @@ impl Selection {
     ) -> Result<LearntPolicy, LearnFailure> {
         let robot = &task.world.robot;
         let reward = ProgressReward { contact: FINE_CONTACT, ..ProgressReward::default() };
-        let networks = Box::new(Prior::shipped(robot).networks().clone());
-        let learner = SacLearner::new(self.train.clone()).with_start(SacStart::Networks(networks));
+        let actor = Prior::shipped(robot).actor().clone();
+        let networks = SacState::with_actor(actor, &self.train.sac, &mut task.seed.stream("critics", 0));
+        let start = SacStart::Networks(Box::new(networks));
+        let learner = SacLearner::new(self.train.clone()).with_start(start);
         let training = NetworkTraining {
             interface: prior_interface(robot, PolicyContext::new(&task.conditions.noise, 1.0)),
             reward: Arc::new(reward),
