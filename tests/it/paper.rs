@@ -11,7 +11,7 @@ use sharp_maps::FloorplanKind;
 use sharp_options::{AllowedRule, OptionKind, OptionSpec};
 use sharp_plan::{Candidate, Method, OptionGraph, Query, Search};
 use sharp_rbvd::{StateAbstraction, StateId};
-use sharp_sim::RobotModel;
+use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{Pose, Seed};
 
 use crate::worlds::TestWorld;

@@ -165,8 +165,8 @@ pub(crate) struct Solve {
     /// Initial configuration: metres, metres, radians in the map's frame.
     #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "goal")]
     pub(crate) start: Option<String>,
-    /// Goal configuration; its heading is free.
-    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "start")]
+    /// Goal configuration; its heading is free and may be left out.
+    #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true, requires = "start")]
     pub(crate) goal: Option<String>,
     /// One of a named map's own problems, instead of --start and --goal.
     #[arg(long, value_name = "1..5", conflicts_with_all = ["start", "goal"])]
@@ -471,8 +471,8 @@ pub(crate) struct Baseline {
     /// Initial configuration: metres, metres, radians in the map's frame.
     #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "goal")]
     pub(crate) start: Option<String>,
-    /// Goal configuration; its heading is free.
-    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "start")]
+    /// Goal configuration; its heading is free and may be left out.
+    #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true, requires = "start")]
     pub(crate) goal: Option<String>,
     /// One of a named map's own problems, instead of --start and --goal.
     #[arg(long, value_name = "1..5", conflicts_with_all = ["start", "goal"])]

@@ -29,17 +29,38 @@ pub(crate) fn simulator(name: &str) -> Result<SimulatorKind, Failure> {
     name.parse().map_err(|error: UnknownSimulator| Failure::new("USAGE", format!("--simulator: {error}")))
 }
 
-/// A pose typed as `X,Y,YAW`.
-pub(crate) fn pose(flag: &str, text: &str) -> Result<Pose, Failure> {
-    let broken =
-        || Failure::new("POSE_INVALID", format!("{flag} is {text:?}, expected three finite numbers X,Y,YAW"));
+/// Whether a pose needs a heading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum HeadingRule {
+    /// It does.
+    Needed,
+    /// Any will do: without one it is 0.
+    Free,
+}
+
+/// A pose typed as `X,Y,YAW` or `X Y YAW`; the yaw may be left out where it is free.
+pub(crate) fn pose(flag: &str, text: &str, heading: HeadingRule) -> Result<Pose, Failure> {
+    let expected = match heading {
+        HeadingRule::Needed => "three finite numbers X,Y,YAW",
+        HeadingRule::Free => "finite numbers X,Y or X,Y,YAW",
+    };
+    let broken = || Failure::new("POSE_INVALID", format!("{flag} is {text:?}, expected {expected}"));
+    let parts: Vec<&str> =
+        if text.contains(',') { text.split(',').collect() } else { text.split_whitespace().collect() };
     let numbers: Vec<f64> =
-        text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().map_err(|_| broken())?;
-    let [x, y, yaw] = <[f64; 3]>::try_from(numbers).map_err(|_| broken())?;
+        parts.iter().map(|part| part.trim().parse()).collect::<Result<_, _>>().map_err(|_| broken())?;
+    let (x, y, yaw) = match (&numbers[..], heading) {
+        (&[x, y, yaw], _) => (x, y, yaw),
+        (&[x, y], HeadingRule::Free) => (x, y, 0.0),
+        _ => return Err(broken()),
+    };
     let is_sane = |value: f64, limit: f64| value.is_finite() && value.abs() <= limit;
     // Beyond 1000 rad an angle is a mistake in its unit, and its wrapped value has lost digits.
     if !(is_sane(x, 1e9) && is_sane(y, 1e9) && is_sane(yaw, 1000.0)) {
         return Err(broken());
+    }
+    if yaw.abs() > std::f64::consts::TAU + 1e-6 {
+        eprintln!("warning: {flag} has a yaw of {yaw}, more than a full turn: angles are radians");
     }
     Ok(Pose::new(x, y, yaw))
 }
@@ -85,7 +106,10 @@ pub(crate) fn query(
     problem: Option<usize>,
 ) -> Result<Query, Failure> {
     if let (Some(start), Some(goal)) = (start, goal) {
-        return Ok(Query { start: pose("--start", start)?, goal: pose("--goal", goal)? });
+        return Ok(Query {
+            start: pose("--start", start, HeadingRule::Needed)?,
+            goal: pose("--goal", goal, HeadingRule::Free)?,
+        });
     }
     let Some(number) = problem else {
         return Err(Failure::new("USAGE", "either --start and --goal or --problem is needed"));
@@ -111,10 +135,17 @@ mod tests {
     #[test]
     fn broken_poses_name_flag_and_value() {
         for text in ["", "1,2", "1,2,3,4", "1,NaN,0", "inf,0,0", "1,2,x", "0,0,1e9"] {
-            let message = pose("--start", text).unwrap_err().to_string();
+            let message = pose("--start", text, HeadingRule::Needed).unwrap_err().to_string();
             assert!(message.contains("--start") && message.contains(&format!("{text:?}")), "{message}");
         }
-        assert_eq!(pose("--goal", "-1.5, 2,3").unwrap(), Pose::new(-1.5, 2.0, 3.0));
+        for text in ["-1.5, 2,3", "-1.5 2 3", " -1.5  2 3 "] {
+            assert_eq!(
+                pose("--start", text, HeadingRule::Needed).unwrap(),
+                Pose::new(-1.5, 2.0, 3.0),
+                "{text:?}"
+            );
+        }
+        assert_eq!(pose("--goal", "1,2", HeadingRule::Free).unwrap(), Pose::new(1.0, 2.0, 0.0));
     }
 
     #[test]

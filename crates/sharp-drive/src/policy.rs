@@ -2,6 +2,8 @@
 
 use std::fmt::Debug;
 
+use sharp_sim::RobotModel;
+
 use crate::command::Command;
 use crate::follower::Follower;
 use crate::network::NetworkPolicy;
@@ -66,6 +68,14 @@ impl OptionPolicy {
             Self::Network(_) => "learnt",
             Self::Custom(_) => "custom",
         }
+    }
+
+    /// What drives where no learnt policy succeeds often enough: at most four hand-written followers.
+    #[must_use]
+    pub fn fallbacks(robot: &RobotModel) -> Vec<Self> {
+        let mut all: Vec<Self> = ProfiledFollower::all_tuned(robot).into_iter().map(Self::Profiled).collect();
+        all.push(Self::Follower(Follower::cautious(robot)));
+        all
     }
 
     fn inner(&mut self) -> &mut dyn Policy {

@@ -16,7 +16,7 @@ use crate::network::{Correction, NetworkPolicy, PolicyContext, PolicyInterface};
 use crate::policy::OptionPolicy;
 
 /// Degrees of caution at which the prior is offered, the least first.
-const CAUTIONS: [f32; 3] = [0.0, CAUTION, 1.0];
+const CAUTIONS: [f32; 5] = [0.0, 0.25, CAUTION, 0.75, 1.0];
 /// The degree of caution of a prior that is taken without a choice.
 const CAUTION: f32 = 0.5;
 

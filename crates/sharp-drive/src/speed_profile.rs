@@ -105,16 +105,22 @@ impl ProfiledFollower {
         }
     }
 
+    /// The tuned ones of robots that move as `robot` does, one for each sort of noise.
+    #[must_use]
+    pub fn all_tuned(robot: &RobotModel) -> Vec<Self> {
+        let tuned = &PRESETS.tuned;
+        if robot.can_turn_in_place() {
+            vec![tuned.turning, tuned.turning_harsh]
+        } else {
+            vec![tuned.steering, tuned.steering_biased, tuned.steering_harsh]
+        }
+    }
+
     /// The profiled followers that are compared for an option of `robot`: the tuned ones, and some that weigh
     /// speed against clearance differently.
     #[must_use]
     pub fn candidates(robot: &RobotModel) -> Vec<Self> {
-        let tuned = &PRESETS.tuned;
-        let own = if robot.can_turn_in_place() {
-            vec![tuned.turning, tuned.turning_harsh]
-        } else {
-            vec![tuned.steering, tuned.steering_biased, tuned.steering_harsh]
-        };
+        let own = Self::all_tuned(robot);
         let (base, profiled) = (own[0].speed, &PRESETS.profiled);
         let others = profiled.speeds.iter().flat_map(|&(cruise, slow)| {
             let speed = SpeedProfile { cruise, slow, ..base };

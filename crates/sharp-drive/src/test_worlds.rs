@@ -51,7 +51,7 @@ pub(crate) fn hall_options() -> Vec<Arc<GuidedOption>> {
     let centers = [0, 1, 2].map(|index| options.endpoints()[index].center);
     let (states, options) = (Arc::new(states), Arc::new(options));
     let space = OptionSpace { states, options, rule: AllowedRule::default() };
-    let goal = Goal { point: Point::new(9.0, 2.2), radius_m: 0.4 };
+    let goal = Goal::new(Point::new(9.0, 2.2), 0.4, &field);
     let [s0, s1, s2] = [0, 1, 2].map(StateId);
     let [c0, c1, c2] = centers.map(|center| (center.x, center.y));
     let centroid = |from, to| LegId::Option(OptionId::Centroid { from, to });
@@ -61,6 +61,6 @@ pub(crate) fn hall_options() -> Vec<Arc<GuidedOption>> {
         (centroid(s1, s2), (s1, s2), straight(c1, c2)),
         (LegId::Last(2, s2), (s2, s2), straight(c2, (9.0, 2.2))),
     ];
-    let option = |(id, between, guide)| Arc::new(GuidedOption::new(&space, id, between, guide, goal));
+    let option = |(id, between, guide)| Arc::new(GuidedOption::new(&space, id, between, guide, goal.clone()));
     plan.into_iter().map(option).collect()
 }

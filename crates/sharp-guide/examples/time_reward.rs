@@ -41,7 +41,7 @@ fn option() -> GuidedOption {
     let space = OptionSpace { states, options, rule: AllowedRule::Paper };
     let poses = (0..=30).map(|i| Pose::new(2.0 + 0.2 * f64::from(i), 1.5, 0.0)).collect();
     let guide = GuidePath::new(poses, 0.25).expect("short gaps");
-    let goal = Goal { point: guide.end().position, radius_m: 0.3 };
+    let goal = Goal::new(guide.end().position, 0.3, &field);
     GuidedOption::new(&space, LegId::Direct, (StateId(0), StateId(0)), guide, goal)
 }
 

@@ -12,6 +12,7 @@ use sharp_options::{AllowedRule, Endpoint, EndpointId, OptionId, OptionSet};
 use sharp_rbvd::{StateAbstraction, StateId};
 use sharp_space::{Cell, GridFrame, OccupancyGrid, Point, Pose};
 
+use crate::goal::Goal;
 use crate::path::GuidePath;
 use crate::reward::Place;
 
@@ -85,22 +86,13 @@ pub enum Target {
     Goal(Goal),
 }
 
-/// The goal of a problem.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Goal {
-    /// Its position.
-    pub point: Point,
-    /// Distance within which it counts as reached, metres.
-    pub radius_m: f64,
-}
-
 impl Target {
     /// Returns true if a robot at `point` has arrived.
     #[must_use]
     pub fn contains(&self, point: Point, states: &dyn StateAbstraction) -> bool {
         match self {
             Self::Endpoint(endpoint) => endpoint.contains(point, states),
-            Self::Goal(Goal { point: goal, radius_m }) => (point - goal).norm() < *radius_m,
+            Self::Goal(goal) => goal.contains(point),
         }
     }
 
@@ -144,7 +136,7 @@ impl OptionSpace {
                 .get(option)
                 .map_or_else(Vec::new, |spec| self.options.allowed_states(spec, self.rule).collect()),
             LegId::First(_) | LegId::Last(..) => vec![from, to],
-            LegId::Direct if from == to => vec![from],
+            LegId::Direct if from == to && self.rule == AllowedRule::Paper => vec![from],
             LegId::Direct => self.states.states().collect(),
         }
     }

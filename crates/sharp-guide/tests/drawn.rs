@@ -10,7 +10,7 @@ use sharp_options::{AllowedRule, OptionKind, OptionSet, OptionSettings, OptionSp
 use sharp_rbvd::{Rbvd, RbvdSettings, StateId};
 use sharp_space::{
     Cell, DistanceField, Footprint, FootprintChecker, Heading, OccupancyGrid, Point, Pose, Region, RegionId,
-    Seed,
+    RobotGeometry, Seed,
 };
 
 /// Two rooms, one door of 1.2 m whose middle is at (4.1, 2.4); cells of 0.2 m.
@@ -140,7 +140,7 @@ fn guided(space: &OptionSpace, spec: &OptionSpec, checker: &FootprintChecker) ->
     let guide = option
         .plan_guide(space, &robot, &ClearanceSearch::default(), &mut rng)
         .unwrap_or_else(|reason| panic!("{id}: {reason}"));
-    GuidedOption::new(space, id, (from, to), guide, Goal { point: end, radius_m: 0.4 })
+    GuidedOption::new(space, id, (from, to), guide, Goal::new(end, 0.4, checker.clearance()))
 }
 
 #[test]

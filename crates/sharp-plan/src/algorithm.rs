@@ -17,6 +17,7 @@ use crate::library::OptionLibrary;
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Phase;
+use crate::reason::obstruction;
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
 use crate::verify::{PlannedOption, Solution, verify};
@@ -63,7 +64,7 @@ fn algorithm_1(
     let known = Policies::guides(library);
     let mut search = match Search::new(world, abstraction, method, &conditions.noise, query, known, seed) {
         Ok(search) => search,
-        Err(unplaced) => return Ok(Outcome::NoPlan(unplaced.to_string())),
+        Err(unplaced) => return Ok(Outcome::NoPlan(describe(problem, &unplaced.to_string()))),
     };
     let mut policies = Policies::new(library);
     let (mut best, mut verified): (Option<Solution>, usize) = (None, 0);
@@ -111,7 +112,7 @@ fn algorithm_1(
     let keeps_all = method.usable_success == 0.0;
     Ok(match best.filter(|solution| keeps_all || solution.predicted.successes > 0) {
         Some(solution) => Outcome::Solved(Box::new(solution)),
-        None => Outcome::NoPlan(describe_no_plan(&search)),
+        None => Outcome::NoPlan(describe(problem, &describe_search(&search))),
     })
 }
 
@@ -160,8 +161,13 @@ fn charge_hand_overs(search: &mut Search<'_>, steps: &[PlannedOption], failure_c
     }
 }
 
-fn describe_no_plan(search: &Search<'_>) -> String {
-    let nothing = "no sequence of options leads from the start to the goal";
+/// Why there is no plan: what the map says, where that is enough, else what the search knows.
+fn describe(problem: &PlanningProblem<'_>, known: &str) -> String {
+    obstruction(problem.world, &problem.query).unwrap_or_else(|| known.to_owned())
+}
+
+fn describe_search(search: &Search<'_>) -> String {
+    let nothing = "no plan that was tried reaches the goal";
     match search.unguided().next() {
         Some((id, reason)) => {
             let count = search.unguided().count();

@@ -171,7 +171,7 @@ fn hall() -> (World, Arc<GuidedOption>) {
     let abstraction = Abstraction::new(Arc::new(states), &InterfaceOptions, &OptionSettings::default());
     let poses = (0..=40).map(|i| Pose::new(2.0 + 0.2 * f64::from(i), 3.0, 0.0)).collect();
     let guide = GuidePath::new(poses, 0.25).expect("short gaps");
-    let goal = Goal { point: guide.end().position, radius_m: 0.3 };
+    let goal = Goal::new(guide.end().position, 0.3, &field);
     let space = abstraction.space(AllowedRule::Code);
     let option = GuidedOption::new(&space, LegId::Direct, (StateId(0), StateId(0)), guide, goal);
     (World::new(grid, RobotModel::husky()), Arc::new(option))

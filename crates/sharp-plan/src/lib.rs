@@ -42,6 +42,7 @@ mod plan_file;
 mod policies;
 mod problem;
 mod query;
+mod reason;
 mod repair;
 mod search;
 mod sharp;

@@ -191,8 +191,10 @@ impl Plan {
         let abstraction = AbstractionFile::load(&folder.join(ABSTRACTION_FILE), &map)?.abstraction();
         let method = Method::of_plan(file.method, file.search, file.failure_cost_s);
         let space = abstraction.space(method.search.allowed);
-        let goal = Goal { point: file.goal.position, radius_m: file.robot.goal_tolerance_m };
-        let steps = file.steps.into_iter().map(|step| planned_option(step, folder, &space, goal));
+        let world = World::new(grid, file.robot);
+        let tolerance_m = world.robot.goal_tolerance_m;
+        let goal = Goal::new(file.goal.position, tolerance_m, world.geometry.clearance());
+        let steps = file.steps.into_iter().map(|step| planned_option(step, folder, &space, goal.clone()));
         let steps = steps.collect::<Result<Vec<_>, _>>()?;
         if steps.is_empty() {
             return Err(FileError::content(&path, "steps is empty, expected at least one"));
@@ -200,7 +202,7 @@ impl Plan {
         let query = Query { start: file.start, goal: file.goal };
         let (predicted, predicted_time_s) = (file.predicted, file.predicted_time_s);
         Ok(Self {
-            world: World::new(grid, file.robot),
+            world,
             abstraction,
             noise: file.noise,
             method,

@@ -10,11 +10,14 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use sharp_drive::{ProfiledFollower, SpeedProfile, World};
-use sharp_guide::{Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption};
+use sharp_guide::{
+    Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption, ridge_routes,
+    routes,
+};
 use sharp_options::OptionId;
 use sharp_rbvd::{StateAbstraction, StateId};
 use sharp_sim::NoiseModel;
-use sharp_space::{Cell, Point, Seed, trig};
+use sharp_space::{Cell, Point, Pose, Seed, trig};
 
 use crate::abstraction::Abstraction;
 use crate::method::{Method, PriceRule, SearchSettings};
@@ -37,6 +40,7 @@ pub struct Search<'a> {
     settings: SearchSettings,
     space: OptionSpace,
     query: Query,
+    goal: Goal,
     graph: OptionGraph,
     guided: BTreeMap<LegId, Result<Arc<GuidedOption>, NoGuide>>,
     /// How fast a robot of this kind drives under the noise of the problem.
@@ -79,13 +83,18 @@ impl<'a> Search<'a> {
         let Abstraction { states, options } = abstraction;
         let start = state_near(&**states, query.start.position).ok_or(Unplaced::Start)?;
         let goal = state_near(&**states, query.goal.position).ok_or(Unplaced::Goal)?;
-        let graph = OptionGraph::new(&**states, options, (query.start, start), (query.goal, goal));
+        let clearance = world.geometry.clearance();
+        let disc = Goal::new(query.goal.position, world.robot.goal_tolerance_m, clearance);
+        let end = disc.easiest_end(clearance, world.robot.footprint.inscribed_radius_m());
+        let end = Pose::at(end, query.goal.heading);
+        let graph = OptionGraph::new(&**states, options, (query.start, start), (end, goal));
         let mut this = Self {
             world,
             guides: &*method.guides,
             settings: method.search,
             space: abstraction.space(method.search.allowed),
             query,
+            goal: disc,
             graph,
             guided: BTreeMap::new(),
             profile: ProfiledFollower::tuned(&world.robot, noise).speed,
@@ -180,7 +189,7 @@ impl<'a> Search<'a> {
             return f64::INFINITY;
         }
         let UnguidedOption { id, from, to, .. } = option.option;
-        if id == LegId::Direct && from != to && !self.offers_direct {
+        if id == LegId::Direct && from != to && !self.offers_direct && !self.is_there() {
             return f64::INFINITY;
         }
         let top_mps = self.world.robot.max_speed_mps;
@@ -235,17 +244,43 @@ impl<'a> Search<'a> {
 
     fn guide(&self, id: LegId) -> Result<Arc<GuidedOption>, NoGuide> {
         let candidate = self.graph.candidate(id).expect("the search returns its own options");
+        if id == LegId::Direct && self.is_there() {
+            let guide = guide_of_nothing(self.query.start, self.settings.guide.spacing_m);
+            return guide.map(|guide| Arc::new(self.guided(candidate, guide)));
+        }
+        if id == LegId::Direct && self.settings.direct {
+            let guide = self.direct_route(candidate.option.end).ok_or(NoGuide::Unreachable)?;
+            return Ok(Arc::new(self.guided(candidate, guide)));
+        }
         let mut rng = self.seed.stream(&format!("guide {id}"), 0);
         let robot = self.world.guide_robot();
         let guide = candidate.option.plan_guide(&self.space, &robot, self.guides, &mut rng)?;
         Ok(Arc::new(self.guided(candidate, guide)))
     }
 
+    /// The cheapest of the routes to `end` with different safety margins, by their prices.
+    fn direct_route(&self, end: Point) -> Option<GuidePath> {
+        let (robot, start) = (self.world.guide_robot(), self.query.start);
+        let price_s = |guide: &GuidePath| self.settings.price_with(&self.profile, self.world, guide);
+        let cheapest = ridge_routes(&robot, start, end).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
+        cheapest.or_else(|| routes(&robot, start, end, 0.5 * self.goal.radius_m).next())
+    }
+
     fn guided(&self, candidate: &Candidate, guide: GuidePath) -> GuidedOption {
-        let goal = Goal { point: self.query.goal.position, radius_m: self.world.robot.goal_tolerance_m };
-        let option = &candidate.option;
+        let (option, goal) = (&candidate.option, self.goal.clone());
         GuidedOption::new(&self.space, option.id, (option.from, option.to), guide, goal)
     }
+
+    /// Returns true if there is nothing to do: the start lies in the goal.
+    fn is_there(&self) -> bool {
+        self.goal.contains(self.query.start.position)
+    }
+}
+
+/// The guide of a robot that has arrived before it begins.
+fn guide_of_nothing(start: Pose, spacing_m: f64) -> Result<GuidePath, NoGuide> {
+    let end = Pose::at(start.position + start.heading.unit() * (0.5 * spacing_m), start.heading);
+    GuidePath::new(vec![start, end], spacing_m).map_err(|_| NoGuide::NoLength(start.position))
 }
 
 /// α(x), or the state of the nearest cell that has one nearby.
@@ -268,11 +303,9 @@ fn state_near(states: &dyn StateAbstraction, point: Point) -> Option<StateId> {
 
 #[cfg(test)]
 mod tests {
-    use sharp_options::OptionKind;
-    use sharp_space::Pose;
-
     use super::*;
     use crate::test_worlds::{HALL, RING, SEALED, along, straight, world};
+    use sharp_options::OptionKind;
 
     fn names(options: &[Arc<GuidedOption>]) -> String {
         options.iter().map(|option| option.id.to_string()).collect::<Vec<_>>().join(" ")

@@ -18,6 +18,7 @@ pub struct FootprintError {
 
 /// A rectangle around the robot's reference point. Its length lies along the heading.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Footprint {
     half_length_m: f64,
     half_width_m: f64,

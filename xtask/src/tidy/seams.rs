@@ -5,7 +5,7 @@ use super::code::{is_example, plain, words};
 use crate::tree::Tree;
 
 /// The traits, each with the crate that owns it.
-const SEAMS: [(&str, &str); 14] = [
+const SEAMS: [(&str, &str); 15] = [
     ("sharp-space", "CollisionChecker"),
     ("sharp-space", "RobotGeometry"),
     ("sharp-space", "RegionDetector"),

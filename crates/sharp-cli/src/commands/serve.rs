@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sharp_drive::{Command, Controller, Decision, Motion};
 use sharp_plan::{ComposedPolicy, Plan};
 use sharp_sim::{ActionSettings, RobotState};
-use sharp_space::{Pose, Vector, trig};
+use sharp_space::{Occupancy, Pose, Vector, trig};
 
 use crate::args::Serve;
 use crate::commands::run::load_plan;
@@ -44,8 +44,12 @@ pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
         let reply = match parse(&line, index + 1) {
             Ok(request) => {
                 let state = state(&request, driver.as_ref().map(|served| &served.state));
-                let served = driver.get_or_insert_with(|| Served::new(&plan, state));
-                served.answer(state)
+                if is_placed(&plan, &state.pose) {
+                    driver.get_or_insert_with(|| Served::new(&plan, state)).answer(state)
+                } else {
+                    // What it knew of the robot before stays, for the next pose may be a real one again.
+                    to_json(&Reply { waypoint: None, speed: 0.0, option: "", status: "lost" })
+                }
             }
             Err(failure) => failure.to_json(),
         };
@@ -65,6 +69,12 @@ fn parse(line: &str, number: usize) -> Result<Request, Failure> {
         return Err(broken("pose, speed and yaw_rate must be finite".to_owned()));
     }
     Ok(request)
+}
+
+/// Returns true if a robot can be at `pose`: its middle is in the free space of the map.
+fn is_placed(plan: &Plan, pose: &Pose) -> bool {
+    let grid = &plan.world.grid;
+    grid.frame().cell_at(pose.position).is_some_and(|cell| grid.get(cell) == Occupancy::Free)
 }
 
 /// The robot's state; motion that was not told is taken from the last two poses, one action apart.

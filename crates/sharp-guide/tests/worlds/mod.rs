@@ -107,7 +107,7 @@ impl Drawn {
         let guide = option
             .plan_guide(&self.space, &self.robot(), &ClearanceSearch::default(), &mut rng)
             .unwrap_or_else(|reason| panic!("{name}: {reason}"));
-        let goal = Goal { point: problem.goal, radius_m: 0.4 };
+        let goal = Goal::new(problem.goal, 0.4, self.robot().geometry.clearance());
         GuidedOption::new(&self.space, option.id, (option.from, option.to), guide, goal)
     }
 

@@ -75,7 +75,7 @@ pub enum MapError {
     /// The image of a ROS map lies outside the map's folder.
     #[error(
         "{file}: image is {image:?}, must lie inside the map's folder \
-         (images elsewhere have to be allowed explicitly)"
+         (--allow-outside allows images elsewhere)"
     )]
     ImageOutside {
         /// The map file.

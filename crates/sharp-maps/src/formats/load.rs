@@ -82,7 +82,7 @@ fn load_file(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
             let bytes = files::read(path, FileKind::Text)?;
             floor_plan::parse(spec, files::as_text(spec, &bytes)?)?
         }
-        _ => load_cells(spec, &ending, options)?,
+        _ => load_cells(spec, &ending, options, &mut warnings)?,
     };
     if matches!(ending.as_str(), "yaml" | "yml" | "ron") && options.resolution_m.is_some() {
         warnings.push(format!("{spec}: states its own resolution, the given one is not used"));
@@ -92,13 +92,19 @@ fn load_file(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
 }
 
 /// Images and `MovingAI` maps: files that hold the cells themselves.
-fn load_cells(spec: &str, ending: &str, options: &LoadOptions) -> Result<OccupancyGrid, MapError> {
+fn load_cells(
+    spec: &str,
+    ending: &str,
+    options: &LoadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<OccupancyGrid, MapError> {
     let bytes = files::read(Path::new(spec), FileKind::Cells)?;
     if picture::is_picture(&bytes) {
         let expected = "given in metres a pixel, as a plain image does not state it";
         let resolution_m =
             options.resolution_m.ok_or_else(|| MapError::field(spec, "resolution", "missing", expected))?;
         let picture = picture::decode(spec, &bytes)?;
+        warnings.extend(picture.warning.iter().map(|warning| format!("{spec}: {warning}")));
         return ros::plain_grid(spec, &picture, resolution_m);
     }
     if ending == "map" || bytes.starts_with(b"type ") {

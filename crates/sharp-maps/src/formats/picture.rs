@@ -1,8 +1,7 @@
 //! Decoding of map images into grey values, with checks that the decoders do not make.
 //!
-//! A PGM that was saved with CR LF line ends is shifted by one byte, and one that was cut or
-//! appended to is read without complaint by many tools; here the file must end where its header
-//! says.
+//! A PGM that was saved with CR LF line ends is shifted by one byte, and one that was cut is read without complaint by
+//! many tools; both are refused here. Bytes after the last pixel, which some tools write, are warned about.
 
 use std::io::Cursor;
 
@@ -26,6 +25,8 @@ pub(crate) struct GreyImage {
     pub(crate) grey: Vec<u8>,
     /// Which pixels are not fully opaque; `None` if the image has no alpha channel.
     pub(crate) transparent: Option<Vec<bool>>,
+    /// What is odd about the file.
+    pub(crate) warning: Option<String>,
 }
 
 /// Returns true if `bytes` begin like an image that [`decode`] knows.
@@ -35,8 +36,9 @@ pub(crate) fn is_picture(bytes: &[u8]) -> bool {
 
 /// Decodes PNG, BMP and PNM (P1 to P6), told apart by their first bytes.
 pub(crate) fn decode(file: &str, bytes: &[u8]) -> Result<GreyImage, MapError> {
+    let mut warning = None;
     let image = match format_of(bytes) {
-        Some(ImageFormat::Pnm) => decode_pnm(file, bytes)?,
+        Some(ImageFormat::Pnm) => decode_pnm(file, bytes, &mut warning)?,
         Some(format) => {
             let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
             reader.limits(limits());
@@ -47,7 +49,7 @@ pub(crate) fn decode(file: &str, bytes: &[u8]) -> Result<GreyImage, MapError> {
             return Err(MapError::image(file, "is no PNG, PGM or BMP image: its first bytes are unknown"));
         }
     };
-    Ok(to_grey(image))
+    Ok(GreyImage { warning, ..to_grey(image) })
 }
 
 fn format_of(bytes: &[u8]) -> Option<ImageFormat> {
@@ -74,7 +76,7 @@ fn from_decoder(file: &str, mut decoder: impl ImageDecoder) -> Result<DynamicIma
     DynamicImage::from_decoder(decoder).map_err(|e| refused(&e))
 }
 
-fn decode_pnm(file: &str, bytes: &[u8]) -> Result<DynamicImage, MapError> {
+fn decode_pnm(file: &str, bytes: &[u8], warning: &mut Option<String>) -> Result<DynamicImage, MapError> {
     let mut cursor = Cursor::new(bytes);
     let decoder = PnmDecoder::new(&mut cursor).map_err(|e| MapError::image(file, reason(&e)))?;
     let image = from_decoder(file, decoder)?;
@@ -85,25 +87,22 @@ fn decode_pnm(file: &str, bytes: &[u8]) -> Result<DynamicImage, MapError> {
     }
     let first_pixel = bytes.len().saturating_sub(rest.len() + image.as_bytes().len());
     let ends_in_cr_lf = first_pixel > 0 && bytes[first_pixel - 1..].starts_with(b"\r\n");
-    Err(MapError::image(
-        file,
-        if ends_in_cr_lf {
-            "its header ends in CR LF, must end in a single white space".to_owned()
-        } else {
-            format!("has {} bytes after the last pixel, must have none", rest.len())
-        },
-    ))
+    if ends_in_cr_lf {
+        return Err(MapError::image(file, "its header ends in CR LF, must end in a single white space"));
+    }
+    *warning = Some(format!("has {} bytes after the last pixel, they are not read", rest.len()));
+    Ok(image)
 }
 
 fn to_grey(image: DynamicImage) -> GreyImage {
     let (width, height) = (image.width() as usize, image.height() as usize);
     if let DynamicImage::ImageLuma8(grey) = image {
-        return GreyImage { width, height, grey: grey.into_raw(), transparent: None };
+        return GreyImage { width, height, grey: grey.into_raw(), transparent: None, warning: None };
     }
     let transparent =
         image.color().has_alpha().then(|| image.pixels().map(|(_, _, rgba)| rgba[3] < 255).collect());
     let grey = image.pixels().map(|(_, _, rgba)| intensity(rgba.0)).collect();
-    GreyImage { width, height, grey, transparent }
+    GreyImage { width, height, grey, transparent, warning: None }
 }
 
 /// Grey value of a colour with the weights of the image library behind Nav2 (ITU-R BT.601).

@@ -6,7 +6,7 @@
 //! sizes and numbers, the refusal of repeated keys, and where the image may lie.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_saphyr::options::{DuplicateKeyPolicy, MergeKeyPolicy, NonFiniteFloatPolicy};
@@ -21,6 +21,9 @@ use super::picture::{self, GreyImage};
 pub(crate) const OCCUPIED_THRESHOLD: f64 = 0.65;
 /// Just below 1 - 205/255, so that the grey 205 stays unknown.
 pub(crate) const FREE_THRESHOLD: f64 = 0.196;
+
+/// The grey that map savers write for cells that were never observed.
+pub(crate) const UNKNOWN_GREY: u8 = 205;
 
 /// Beyond this, a double is too coarse for micrometres, metres.
 const ORIGIN_MAX_M: f64 = 1e9;
@@ -106,7 +109,21 @@ pub(crate) fn load(
     let image_file = image.display().to_string();
     let picture = files::read(&image, FileKind::Cells).and_then(|bytes| picture::decode(&image_file, &bytes));
     let picture = picture.map_err(|source| in_image(&file, &description.image, source))?;
+    warnings.extend(picture.warning.iter().map(|warning| format!("{image_file}: {warning}")));
+    warnings.extend(unknown_as_free(&file, &picture, &description.rules));
     to_grid(&file, &picture, &description)
+}
+
+/// A warning if the grey that map savers write for unknown cells is there and counts as free.
+fn unknown_as_free(file: &str, picture: &GreyImage, rules: &GreyRules) -> Option<String> {
+    let counts_as_free = rules.mode != GreyMode::Raw && !rules.negate && rules.value_of(UNKNOWN_GREY) == 0;
+    (counts_as_free && picture.grey.contains(&UNKNOWN_GREY)).then(|| {
+        format!(
+            "{file}: with free_thresh {} the grey {UNKNOWN_GREY} counts as free, map savers write it for unknown cells; \
+             {FREE_THRESHOLD} keeps it unknown",
+            rules.free_threshold
+        )
+    })
 }
 
 /// An image without a description: white is free, black is occupied, the grey 205 is unknown.
@@ -126,7 +143,7 @@ pub(crate) fn plain_grid(
 }
 
 fn to_grid(file: &str, picture: &GreyImage, description: &RosDescription) -> Result<OccupancyGrid, MapError> {
-    let GreyImage { width, height, grey, transparent } = picture;
+    let GreyImage { width, height, grey, transparent, .. } = picture;
     let table: Vec<Occupancy> = (0..=255).map(|grey| description.rules.occupancy_of(grey)).collect();
     // Raw images state values, not looks: transparency means nothing there.
     let transparent = transparent.as_ref().filter(|_| description.rules.mode != GreyMode::Raw);
@@ -150,24 +167,34 @@ fn to_grid(file: &str, picture: &GreyImage, description: &RosDescription) -> Res
     OccupancyGrid::new(frame, cells).map_err(|e| MapError::grid(file, e))
 }
 
-/// The image's path, which must lead to somewhere inside the YAML's folder unless allowed otherwise.
+/// The image's path, which must be inside the YAML's folder unless allowed otherwise.
 fn find_image(yaml: &Path, file: &str, image: &str, options: &LoadOptions) -> Result<PathBuf, MapError> {
     let folder = match yaml.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
     let path = folder.join(image);
-    let resolve = |path: &Path| {
-        fs::canonicalize(path).map_err(|source| {
-            let unreadable = MapError::Read { file: path.display().to_string(), source };
-            in_image(file, image, unreadable)
-        })
-    };
-    // Links are followed first, so that neither `..` nor a link leads outside.
-    if !options.allow_outside && !resolve(&path)?.starts_with(resolve(folder)?) {
+    // Names decide: a link inside the folder was put there by whoever owns the folder, and an installed workspace
+    // is made of links.
+    let is_inside = matches!((spelt_out(&path), spelt_out(folder)), (Some(path), Some(folder)) if path.starts_with(&folder));
+    let resolve = |path: &Path| fs::canonicalize(path).ok();
+    let leads_inside = || matches!((resolve(&path), resolve(folder)), (Some(path), Some(folder)) if path.starts_with(&folder));
+    if !options.allow_outside && !is_inside && !leads_inside() {
         return Err(MapError::ImageOutside { file: file.to_owned(), image: image.to_owned() });
     }
     Ok(path)
+}
+
+/// `path` from the root, without `.` and `..`; links are not followed.
+fn spelt_out(path: &Path) -> Option<PathBuf> {
+    let mut spelt = PathBuf::new();
+    for part in std::path::absolute(path).ok()?.components() {
+        match part {
+            Component::ParentDir => _ = spelt.pop(),
+            part => spelt.push(part),
+        }
+    }
+    Some(spelt)
 }
 
 fn in_image(file: &str, image: &str, source: MapError) -> MapError {

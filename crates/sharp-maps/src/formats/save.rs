@@ -41,7 +41,7 @@ fn pgm(grid: &OccupancyGrid) -> Vec<u8> {
         bytes.extend(row.iter().map(|cell| match cell {
             Occupancy::Free => 254,
             Occupancy::Occupied => 0,
-            Occupancy::Unknown => 205,
+            Occupancy::Unknown => super::ros::UNKNOWN_GREY,
         }));
     }
     bytes

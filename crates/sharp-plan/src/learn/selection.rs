@@ -1,11 +1,10 @@
-//! The default: the cheapest policy at hand that succeeds often enough, and training only in repairs.
+//! The default: the prior where it succeeds often enough, else a follower, and training only in repairs.
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
 use sharp_drive::{
-    Follower, OptionPolicy, PolicyContext, Prior, ProfiledFollower, SuccessCount, SuccessEstimate, World,
-    prior_interface,
+    OptionPolicy, PolicyContext, Prior, SuccessCount, SuccessEstimate, World, prior_interface,
 };
 use sharp_guide::ProgressReward;
 use sharp_rl::{Exploration, SacLearner, SacStart, SacState, StopRule, TrainSettings};
@@ -16,14 +15,14 @@ use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLea
 
 /// Rounds of successive halving: the share of the screening episodes that each candidate drives, and how many
 /// candidates go on. Those that the last round leaves are compared on all episodes.
-const ROUNDS: [(f64, usize); 3] = [(0.1, 10), (0.3, 5), (1.0, 3)];
+const ROUNDS: [(f64, usize); 2] = [(0.3, 3), (1.0, 2)];
 /// Widths of the prior's hidden layers.
 const PRIOR_HIDDEN: [usize; 2] = [128, 128];
 /// Reward of a contact while a prior is trained on: what it was trained with at full caution.
 const FINE_CONTACT: f64 = -20.0;
 
-/// Chooses among followers and the prior at several degrees of caution; trains the prior on where a plan falls
-/// short and nothing at hand succeeds often enough.
+/// Takes the prior at the best of several degrees of caution, and a follower where that falls short; trains the prior
+/// on where a plan falls short and nothing at hand succeeds often enough.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Selection {
@@ -98,10 +97,8 @@ impl OptionLearner for Selection {
 
     fn candidates(&self, world: &World, noise: &NoiseModel) -> Vec<OptionPolicy> {
         let robot = &world.robot;
-        let mut all: Vec<OptionPolicy> =
-            Follower::candidates(robot).into_iter().map(OptionPolicy::Follower).collect();
-        all.extend(ProfiledFollower::candidates(robot).into_iter().map(OptionPolicy::Profiled));
-        all.extend(Prior::shipped(robot).candidates(robot, noise));
+        let mut all = Prior::shipped(robot).candidates(robot, noise);
+        all.extend(OptionPolicy::fallbacks(robot));
         all
     }
 
@@ -111,42 +108,45 @@ impl OptionLearner for Selection {
 }
 
 impl Selection {
-    /// The cheapest policy at hand that succeeds as often as wanted; where none does, the one that succeeds most
-    /// often, if that is more often than `beaten`.
+    /// The prior at the caution that costs least; where it succeeds less often than wanted, a follower if that costs
+    /// less. `None` if nothing succeeds more often than `beaten`.
     fn choose(
         &self,
         task: &LearningTask<'_>,
         beaten: Option<SuccessCount>,
         monitor: &dyn LearningMonitor,
     ) -> Result<Option<(SuccessEstimate, OptionPolicy)>, LearnFailure> {
+        let (robot, noise) = (&task.world.robot, &task.conditions.noise);
         let episodes = task.estimate_episodes;
         let allowed = (f64::from(episodes) * (1.0 - task.wanted_success)).floor() as u32;
-        let mut most = beaten;
         let mut best: Option<(SuccessEstimate, OptionPolicy)> = None;
-        for policy in self.cheapest(task) {
-            if monitor.should_stop() {
-                return Err(LearnFailure::Stopped);
-            }
-            let useful = most.map_or(episodes, |most| most.failures().saturating_sub(1));
-            let judged = task.judge_while(&policy, useful.max(allowed));
-            if judged.count.episodes < episodes {
-                continue;
-            }
-            let succeeds = judged.count.failures() <= allowed;
-            if succeeds || most.is_none_or(|most| judged.count.successes > most.successes) {
-                most = Some(judged.count);
-                best = Some((judged, policy));
-            }
-            if succeeds {
-                break;
+        for group in [Prior::shipped(robot).candidates(robot, noise), OptionPolicy::fallbacks(robot)] {
+            for policy in self.cheapest(task, group) {
+                if monitor.should_stop() {
+                    return Err(LearnFailure::Stopped);
+                }
+                let useful = beaten.map_or(episodes, |beaten| beaten.failures().saturating_sub(1));
+                let judged = task.judge_while(&policy, useful.max(allowed));
+                if judged.count.episodes < episodes {
+                    continue;
+                }
+                let succeeds = judged.count.failures() <= allowed;
+                let is_useful = beaten.is_none_or(|beaten| judged.count.successes > beaten.successes);
+                let cost_s = |judged: &SuccessEstimate| judged.cost_s(task.failure_cost_s);
+                let is_cheapest = best.as_ref().is_none_or(|best| cost_s(&judged) < cost_s(&best.0));
+                if (succeeds || is_useful) && is_cheapest {
+                    best = Some((judged, policy));
+                }
+                if succeeds {
+                    return Ok(best);
+                }
             }
         }
         Ok(best)
     }
 
-    /// The few candidates that cost least.
-    fn cheapest(&self, task: &LearningTask<'_>) -> Vec<OptionPolicy> {
-        let candidates = self.candidates(task.world, &task.conditions.noise);
+    /// The few of `candidates` that cost least, the cheapest first.
+    fn cheapest(&self, task: &LearningTask<'_>, candidates: Vec<OptionPolicy>) -> Vec<OptionPolicy> {
         successive_halving(candidates, self.screening_episodes, |policy, episodes, round| {
             let trial = task.monte_carlo(episodes, "screen", round);
             trial.estimate(&task.drivers(policy), &task.states).cost_s(task.failure_cost_s)

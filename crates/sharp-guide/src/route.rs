@@ -1,0 +1,72 @@
+//! Routes: guides over the whole free space, from any start to a goal, without options.
+//!
+//! The clearance search plans a route and checks outline and bends; where it cannot, hybrid A* searches. Both try the
+//! robot with the largest safety margin first.
+
+use sharp_motion::{HybridSettings, MotionQuery, Path, Steering, hybrid_astar};
+use sharp_space::{Heading, Point, Pose, Seed};
+
+use crate::inflate::GuideRobot;
+use crate::path::GuidePath;
+use crate::planner::{ClearanceSearch, GuidePlanner};
+use crate::request::{GuideEnd, GuideRequest};
+use crate::settings::GuideSettings;
+
+/// A route from `start` to within `goal_radius_m` of `goal` for each safety margin for which there is one, the largest
+/// margin first. Each is planned when it is asked for.
+pub fn routes<'a>(
+    robot: &GuideRobot<'a>,
+    start: Pose,
+    goal: Point,
+    goal_radius_m: f64,
+) -> impl Iterator<Item = GuidePath> + use<'a> {
+    let robots = robot.inflated_at(Some(start));
+    robots.filter_map(move |robot| {
+        ridge(&robot, start, goal).or_else(|| searched(&robot, start, goal, goal_radius_m))
+    })
+}
+
+/// The same without the search by hybrid A*: quick, and blind in places where a way must be found by manoeuvring.
+pub fn ridge_routes<'a>(
+    robot: &GuideRobot<'a>,
+    start: Pose,
+    goal: Point,
+) -> impl Iterator<Item = GuidePath> + use<'a> {
+    robot.inflated_at(Some(start)).filter_map(move |robot| ridge(&robot, start, goal))
+}
+
+/// Along the ridge of clearance.
+fn ridge(robot: &GuideRobot<'_>, start: Pose, goal: Point) -> Option<GuidePath> {
+    let request = GuideRequest {
+        start: GuideEnd { position: start.position, heading: Some(start.heading) },
+        goal: GuideEnd { position: goal, heading: None },
+        allowed: &|_| true,
+    };
+    // No sampling: hybrid A* finds shorter paths, and finds them always.
+    let settings = GuideSettings { margins: false, ..GuideSettings::default().unsampled() };
+    let unused = &mut Seed(0).stream("route", 0);
+    ClearanceSearch { settings }.plan(&request, robot, unused).ok()
+}
+
+/// By hybrid A*.
+fn searched(robot: &GuideRobot<'_>, start: Pose, goal: Point, goal_radius_m: f64) -> Option<GuidePath> {
+    let settings = HybridSettings { goal_radius_m, ..HybridSettings::default() };
+    let query = MotionQuery { start, goal: Pose::at(goal, start.heading) };
+    let path = hybrid_astar(&query, robot.geometry, &robot.steering, &settings).path()?;
+    as_guide(&path, &robot.steering)
+}
+
+/// The path as a guide: a car's with its headings; otherwise the corners at which the robot turns in
+/// place stay sharp, and headings follow the direction of travel.
+fn as_guide(path: &Path, steering: &Steering) -> Option<GuidePath> {
+    let spacing_m = GuideSettings::default().spacing_m;
+    if matches!(steering, Steering::Dubins { .. }) {
+        return GuidePath::new(path.resample(0.99 * spacing_m).poses().to_vec(), spacing_m).ok();
+    }
+    let mut positions: Vec<Point> = path.poses().iter().map(|pose| pose.position).collect();
+    positions.dedup_by(|a, b| (*a - *b).norm() < 1e-9);
+    let last = positions.len() - 1;
+    let tangent = |i: usize| Heading::of(positions[(i + 1).min(last)] - positions[i.min(last.max(1) - 1)]);
+    let poses = (0..=last).map(|i| Pose::at(positions[i], tangent(i))).collect();
+    GuidePath::new(poses, spacing_m).ok()
+}

@@ -1,0 +1,154 @@
+//! Why there is no plan, in words that lead to a remedy.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use sharp_drive::World;
+use sharp_space::{Cell, Occupancy, Point, trig};
+
+use crate::query::Query;
+
+/// Room beside the outline below which a way counts as narrow for a robot under noise, metres.
+const NARROW_M: f64 = 0.1;
+/// Directions in which the width of a place is measured, over half a turn.
+const DIRECTIONS: u32 = 24;
+
+/// What the map itself says: that no free way joins start and goal, or that even the widest is narrow for the robot.
+/// `None` where the map leaves room.
+pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
+    let Some(place) = narrowest_place(world, query) else {
+        return Some(
+            "start and goal lie in separate parts of the free space: no free way joins them, however small the robot"
+                .to_owned(),
+        );
+    };
+    let robot_m = 2.0 * world.robot.footprint.inscribed_radius_m();
+    let width_m = width_at(world, place);
+    (width_m < robot_m + 2.0 * NARROW_M).then(|| {
+        format!(
+            "the widest way from start to goal is {width_m:.2} m wide at its narrowest place, near ({:.2}, {:.2}), and the \
+             {} is {robot_m:.2} m wide",
+            place.x, place.y, world.robot.name
+        )
+    })
+}
+
+/// A cell with the least clearance on the way to it; the one with the most comes first.
+#[derive(PartialEq)]
+struct Reached {
+    least_m: f64,
+    narrowest: Cell,
+    cell: Cell,
+}
+
+impl Eq for Reached {}
+
+impl PartialOrd for Reached {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Reached {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.least_m.total_cmp(&other.least_m).then_with(|| other.cell.cmp(&self.cell))
+    }
+}
+
+/// The place with the least clearance on the way from start to goal whose least clearance is largest; `None` if no
+/// free way joins them. Ways begin and end with the clearance that start and goal have.
+fn narrowest_place(world: &World, query: &Query) -> Option<Point> {
+    let (frame, field) = (world.grid.frame(), world.geometry.clearance());
+    let start = frame.cell_at(query.start.position)?;
+    let goal = frame.cell_at(query.goal.position)?;
+    // Near its ends a way may be as narrow as they are: that the robot fits there is checked elsewhere.
+    let near_end = 2.0 * world.robot.footprint.circumscribed_radius_m();
+    let clearance_m = |cell: Cell| {
+        let at = frame.center(cell);
+        let is_near = |end: Point| (at - end).norm() < near_end;
+        if is_near(query.start.position) || is_near(query.goal.position) {
+            f64::INFINITY
+        } else {
+            field.at(cell)
+        }
+    };
+    let mut seen = vec![false; frame.len()];
+    let mut open = BinaryHeap::from([Reached { least_m: f64::INFINITY, narrowest: start, cell: start }]);
+    while let Some(Reached { least_m, narrowest, cell }) = open.pop() {
+        if std::mem::replace(&mut seen[frame.index(cell)], true) {
+            continue;
+        }
+        if cell == goal {
+            return Some(frame.center(narrowest));
+        }
+        let Cell { row, col } = cell;
+        let beside = [(row.wrapping_sub(1), col), (row + 1, col), (row, col.wrapping_sub(1)), (row, col + 1)];
+        for (row, col) in beside {
+            let next = Cell::new(col, row);
+            let is_inside = row < frame.height && col < frame.width;
+            if is_inside && !seen[frame.index(next)] && field.at(next) > 0.0 {
+                let here_m = clearance_m(next);
+                let (least_m, narrowest) =
+                    if here_m < least_m { (here_m, next) } else { (least_m, narrowest) };
+                open.push(Reached { least_m, narrowest, cell: next });
+            }
+        }
+    }
+    None
+}
+
+/// The free length of the shortest straight line through `place`, metres.
+fn width_at(world: &World, place: Point) -> f64 {
+    let frame = world.grid.frame();
+    let step_m = 0.25 * frame.resolution_m;
+    let is_free =
+        |point: Point| frame.cell_at(point).is_some_and(|cell| world.grid.get(cell) == Occupancy::Free);
+    let free_m = |angle_rad: f64| {
+        let (sin, cos) = (trig::sin(angle_rad), trig::cos(angle_rad));
+        let along = |distance_m: f64| Point::new(place.x + distance_m * cos, place.y + distance_m * sin);
+        (1..).map(|i| f64::from(i) * step_m).take_while(|&at_m| is_free(along(at_m))).last().unwrap_or(0.0)
+    };
+    let width = |direction: u32| {
+        let angle_rad = std::f64::consts::PI * f64::from(direction) / f64::from(DIRECTIONS);
+        free_m(angle_rad) + free_m(angle_rad + std::f64::consts::PI)
+    };
+    (0..DIRECTIONS).map(width).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_sim::RobotModel;
+    use sharp_space::{OccupancyGrid, Pose};
+
+    use super::*;
+
+    /// Two rooms of 3 m side by side, joined by a door of so many cells of 0.1 m.
+    fn rooms(door: usize) -> (World, Query) {
+        let row = |row: usize| match row {
+            0 | 31 => "#".repeat(61),
+            row if row > 10 && row <= 10 + door => format!("#{}#", ".".repeat(59)),
+            _ => format!("#{0}#{0}#", ".".repeat(29)),
+        };
+        let rows: Vec<String> = (0..32).rev().map(row).collect();
+        let grid = OccupancyGrid::from_ascii(0.1, &rows.join("\n")).expect("a sound drawing");
+        let query = Query { start: Pose::new(1.5, 1.5, 0.0), goal: Pose::new(4.5, 1.5, 0.0) };
+        (World::new(grid, RobotModel::husky()), query)
+    }
+
+    #[test]
+    fn rooms_without_a_door_are_separate() {
+        let (world, query) = rooms(0);
+        let reason = obstruction(&world, &query).expect("no way");
+        assert!(reason.contains("separate parts"), "{reason}");
+    }
+
+    #[test]
+    fn a_narrow_door_is_measured() {
+        let (world, query) = rooms(7);
+        let reason = obstruction(&world, &query).expect("a narrow way");
+        assert!(reason.contains("is 0.70 m wide at its narrowest place, near (3.0"), "{reason}");
+        assert!(reason.contains("the husky is 0.67 m wide"), "{reason}");
+        let (world, query) = rooms(12);
+        assert_eq!(obstruction(&world, &query), None, "a door of 1.2 m leaves room");
+    }
+}
