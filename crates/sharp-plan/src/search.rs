@@ -194,14 +194,14 @@ impl<'a> Search<'a> {
         }
         let top_mps = self.world.robot.max_speed_mps;
         let least_s = option.straight_m() / top_mps;
-        let fastest = match settings.price {
-            PriceRule::Length => settings.nominal_speed,
-            PriceRule::Profile => self.profile.cruise,
+        let unguided_s = match settings.price {
+            PriceRule::Length => least_s / settings.nominal_speed,
+            PriceRule::Profile => least_s,
         };
         let price_s = match self.guided.get(&option.id()) {
-            Some(Ok(_)) => self.prices[&option.id()].max(least_s / fastest),
+            Some(Ok(_)) => self.prices[&option.id()].max(unguided_s),
             Some(Err(_)) => return f64::INFINITY,
-            None => least_s / fastest,
+            None => unguided_s,
         };
         let estimated = price_s + settings.untrained_surcharge_s;
         let bypass_s = if option.is_bypass { settings.bypass_surcharge_s } else { 0.0 };
