@@ -28,8 +28,7 @@ pub struct PriorStage {
 const PRICE_LEAST_S: f32 = 30.0;
 
 impl PriorRecipe {
-    /// The recipe of the shipped priors: it learns to drive with much noise in its actions, then to be exact, and at
-    /// last what a failure costs.
+    /// The recipe of the shipped priors: it learns to drive with much noise in its actions, and then to be exact.
     #[must_use]
     pub fn shipped() -> Self {
         let learn = PriorStage {
@@ -50,22 +49,7 @@ impl PriorRecipe {
                 ppo.actor_waits = 15;
             }),
         };
-        // Half caution now means the price that plans are judged by (`FAILURE_COST_S`).
-        let careful = PriorStage {
-            map_count: 400,
-            strengths: 0.5..1.2,
-            slots: 256,
-            ppo: settings().with(|ppo| {
-                ppo.max_env_steps = 10_000_000;
-                ppo.rollout_steps = Schedule::constant(192.0);
-                ppo.deviation = Schedule::between(0.10, 0.05);
-                ppo.failure_price = FailurePrice { least: 100.0, most: Schedule::constant(10_000.0) };
-                ppo.advantage_max = 30.0;
-                ppo.learning_rate_factor = Schedule { first: 1.0, last: 0.1, begin: 0.6, end: 1.0 };
-                ppo.actor_waits = 10;
-            }),
-        };
-        Self { stages: vec![learn, refine, careful] }
+        Self { stages: vec![learn, refine] }
     }
 
     /// About a minute of one core: drives, and not well.
