@@ -8,8 +8,6 @@ use super::rollout::RolloutRows;
 use super::settings::PpoSettings;
 use crate::network::{Mlp, Tape};
 
-/// Advantages are cut here: single rows shall not rule a gradient.
-const ADVANTAGE_MAX: f32 = 10.0;
 /// Rows that the critic judges at once.
 const ROWS: usize = 512;
 
@@ -46,7 +44,7 @@ impl Advantages {
         for slot in 0..rollout.spec.slots {
             self.estimate_slot(rollout, settings, slot, progress);
         }
-        self.normalise(rollout, settings.caution_bins);
+        self.normalise(rollout, settings);
     }
 
     /// Goes through the steps of one slot, the last first.
@@ -75,7 +73,8 @@ impl Advantages {
 
     /// Gives the advantages of each bin of caution mean 0 and deviation 1: what a failure costs differs by orders of
     /// magnitude, and the careful episodes would outvote the others.
-    fn normalise(&mut self, rollout: &RolloutRows, bin_count: usize) {
+    fn normalise(&mut self, rollout: &RolloutRows, settings: &PpoSettings) {
+        let (bin_count, most) = (settings.caution_bins, settings.advantage_max);
         let bin_of = |caution: f32| ((caution * bin_count as f32) as usize).min(bin_count - 1);
         let mut sums = vec![(0.0_f64, 0.0_f64, 0.0_f64); bin_count];
         for (advantage, step) in self.actions.iter().zip(&rollout.steps) {
@@ -94,7 +93,7 @@ impl Advantages {
             .collect();
         for (advantage, step) in self.actions.iter_mut().zip(&rollout.steps) {
             let (mean, scale) = scales[bin_of(step.caution)];
-            *advantage = ((*advantage - mean) * scale).clamp(-ADVANTAGE_MAX, ADVANTAGE_MAX);
+            *advantage = ((*advantage - mean) * scale).clamp(-most, most);
         }
     }
 }

@@ -107,6 +107,9 @@ pub struct PpoSettings {
     pub failure_price: FailurePrice,
     /// Bins of caution within which advantages are normalised.
     pub caution_bins: usize,
+    /// Normalised advantages are cut here, in deviations: single rows shall not rule a gradient. Rare failures are
+    /// large, so a small number makes them cheaper than their price.
+    pub advantage_max: f32,
     /// Iterations in which only the critic learns: an actor that drives already must not follow a fresh critic.
     pub actor_waits: u64,
     /// Scales observations by mean and deviation of the first rollout, if the actor is fresh.
@@ -132,6 +135,7 @@ impl Default for PpoSettings {
             deviation: Schedule::between(0.5, 0.1),
             failure_price: FailurePrice::NONE,
             caution_bins: 1,
+            advantage_max: 10.0,
             actor_waits: 0,
             normalise: true,
         }
@@ -180,7 +184,8 @@ impl PpoSettings {
         let price = &self.failure_price;
         let priced = price.least >= 0.0 && price.least.is_finite() && price.most.is_valid(1e-6, 1e9);
         check(priced, "failure_price", price, "finite prices")?;
-        check(self.caution_bins > 0, "caution_bins", &self.caution_bins, "a positive count")
+        check(self.caution_bins > 0, "caution_bins", &self.caution_bins, "a positive count")?;
+        check(positive(self.advantage_max), "advantage_max", &self.advantage_max, "a positive number")
     }
 }
 
