@@ -157,7 +157,10 @@ fn assert_plan(world: &TestWorld, query: &Query, options: &[Arc<GuidedOption>], 
     assert_composes(world, &options.iter().map(|option| option.id).collect::<Vec<_>>(), name);
     let (first, last) = (options[0].guide.start(), options[options.len() - 1].guide.end());
     assert_eq!(first.position, query.start.position, "{name}: the first guide starts elsewhere");
-    assert_eq!(last.position, query.goal.position, "{name}: the last guide ends elsewhere");
+    // Near a wall it ends where it is easier, well inside the tolerance.
+    let off_m = (last.position - query.goal.position).norm();
+    let tolerance_m = world.world.robot.goal_tolerance_m;
+    assert!(off_m <= 0.5 * tolerance_m + 1e-9, "{name}: the last guide ends {off_m} m from the goal");
     for pair in options.windows(2) {
         let gap_m = pair[0].guide.end().distance_m(&pair[1].guide.start());
         assert!(gap_m < 1e-9, "{name}: {} and {} are {gap_m} m apart", pair[0].id, pair[1].id);

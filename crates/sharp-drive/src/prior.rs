@@ -1,9 +1,9 @@
 //! The prior: one policy per kind of robot, learnt once on many generated maps, guides and noises.
 //!
 //! An option then begins with a policy that already drives: it is evaluated as it is, at several degrees of
-//! caution, and trained further only where that falls short (`docs/algorithms/prior.md`). The network corrects a follower in the guide's own
-//! frame ([`PolicyInterface::Guide`]), so that what it learnt does not depend on the map. It is told which noise
-//! to expect and how much a contact matters ([`PolicyContext`]).
+//! caution, and trained further only where that falls short (`docs/algorithms/prior.md`). The network corrects a
+//! follower in the guide's own frame ([`PolicyInterface::Guide`]), so that what it learnt does not depend on the map.
+//! It is told which noise to expect and how much a contact matters ([`PolicyContext`]).
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
@@ -16,9 +16,9 @@ use crate::network::{Correction, NetworkPolicy, PolicyContext, PolicyInterface};
 use crate::policy::OptionPolicy;
 
 /// Degrees of caution at which the prior is offered, the least first.
-const CAUTIONS: [f32; 5] = [0.0, 0.25, CAUTION, 0.75, 1.0];
-/// The degree of caution of a prior that is taken without a choice.
-const CAUTION: f32 = 0.5;
+const CAUTIONS: [f32; 5] = [0.0, 0.25, 0.5, 0.75, CAUTION];
+/// The degree of caution of a prior that is taken without a choice: at the usual price of a failure it costs least.
+const CAUTION: f32 = 1.0;
 
 /// The note in a prior's file that says what its inputs mean, and the only value that is read.
 const FORMAT_NOTE: (&str, &str) = ("prior-format", "2");
@@ -83,7 +83,7 @@ impl Prior {
         CAUTIONS.into_iter().map(|caution| self.at(caution, robot, noise)).collect()
     }
 
-    /// Its policy for `robot` under `noise` at middle caution.
+    /// Its policy for `robot` under `noise` at full caution.
     #[must_use]
     pub fn policy(&self, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
         self.at(CAUTION, robot, noise)

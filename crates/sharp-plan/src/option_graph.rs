@@ -240,9 +240,15 @@ mod tests {
         legs.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
     }
 
+    /// The straight length of an option; the direct way through several states is none here.
+    fn cost_m(leg: &Candidate) -> f64 {
+        let is_far = leg.id() == LegId::Direct && leg.option.from != leg.option.to;
+        if is_far { f64::INFINITY } else { leg.straight_m() }
+    }
+
     /// The names of the shortest plan; first and last legs past a centroid cost 10 m more.
     fn shortest(drawing: &str, kind: OptionKind, query: Query) -> Option<String> {
-        let cost = |leg: &Candidate| leg.straight_m() + if leg.is_bypass { 10.0 } else { 0.0 };
+        let cost = |leg: &Candidate| cost_m(leg) + if leg.is_bypass { 10.0 } else { 0.0 };
         graph(drawing, kind, query).search(1.0, cost, |_, _| 0.0).map(|(_, legs)| names(&legs))
     }
 
@@ -274,10 +280,8 @@ mod tests {
     fn an_impossible_leg_or_join_sends_the_plan_the_other_way_round() {
         let across = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
         let graph = graph(RING, OptionKind::Centroid, across);
-        let (length_m, legs) =
-            graph.search(1.0, Candidate::straight_m, |_, _| 0.0).expect("a ring has two ways");
-        let banned =
-            |leg: &Candidate| if legs.contains(&leg.id()) { f64::INFINITY } else { leg.straight_m() };
+        let (length_m, legs) = graph.search(1.0, cost_m, |_, _| 0.0).expect("a ring has two ways");
+        let banned = |leg: &Candidate| if legs.contains(&leg.id()) { f64::INFINITY } else { cost_m(leg) };
         let (detour_m, others) = graph.search(1.0, banned, |_, _| 0.0).expect("the other way");
         assert!(detour_m > length_m, "{detour_m} m is no detour from {length_m} m");
         assert!(legs.iter().all(|leg| !others.contains(leg)), "{} keeps a banned leg", names(&others));
@@ -285,7 +289,7 @@ mod tests {
             let joins = legs.windows(2).any(|pair| pair == [before.id(), after.id()]);
             if joins { f64::INFINITY } else { 0.0 }
         };
-        let (_, rejoined) = graph.search(1.0, Candidate::straight_m, broken).expect("the other way");
+        let (_, rejoined) = graph.search(1.0, cost_m, broken).expect("the other way");
         assert!(rejoined != legs, "{} keeps a join that is impossible", names(&rejoined));
         assert!(graph.search(1.0, |_| f64::INFINITY, |_, _| 0.0).is_none(), "no leg is possible");
     }

@@ -16,6 +16,12 @@ const DIRECTIONS: u32 = 24;
 /// What the map itself says: that no free way joins start and goal, or that even the widest is narrow for the robot.
 /// `None` where the map leaves room.
 pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
+    let frame = world.grid.frame();
+    for (end, pose) in [("start", query.start), ("goal", query.goal)] {
+        if frame.cell_at(pose.position).is_none() {
+            return Some(format!("the {end} lies outside the map"));
+        }
+    }
     let Some(place) = narrowest_place(world, query) else {
         return Some(
             "start and goal lie in separate parts of the free space: no free way joins them, however small the robot"
@@ -100,13 +106,15 @@ fn narrowest_place(world: &World, query: &Query) -> Option<Point> {
 /// The free length of the shortest straight line through `place`, metres.
 fn width_at(world: &World, place: Point) -> f64 {
     let frame = world.grid.frame();
-    let step_m = 0.25 * frame.resolution_m;
+    let step_m = 0.05 * frame.resolution_m;
     let is_free =
         |point: Point| frame.cell_at(point).is_some_and(|cell| world.grid.get(cell) == Occupancy::Free);
     let free_m = |angle_rad: f64| {
         let (sin, cos) = (trig::sin(angle_rad), trig::cos(angle_rad));
         let along = |distance_m: f64| Point::new(place.x + distance_m * cos, place.y + distance_m * sin);
-        (1..).map(|i| f64::from(i) * step_m).take_while(|&at_m| is_free(along(at_m))).last().unwrap_or(0.0)
+        // The edge lies somewhere in the step after the last free one.
+        let free = (1..).map(|i| f64::from(i) * step_m).take_while(|&at_m| is_free(along(at_m))).last();
+        free.unwrap_or(0.0) + 0.5 * step_m
     };
     let width = |direction: u32| {
         let angle_rad = std::f64::consts::PI * f64::from(direction) / f64::from(DIRECTIONS);

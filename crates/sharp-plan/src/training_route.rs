@@ -81,6 +81,7 @@ pub fn training_routes(
     // What a prior is trained on does not follow the search's prices.
     let search = SearchSettings {
         price: PriceRule::Length,
+        untrained_surcharge_s: 8.0,
         bypasses: false,
         direct: false,
         ..SearchSettings::default()

@@ -4,7 +4,7 @@ use sharp_drive::Prior;
 
 use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner};
 
-/// Takes the shipped prior at its middle caution.
+/// Takes the shipped prior at full caution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PriorOnly;
 
