@@ -39,7 +39,7 @@ pub struct Observation {
     /// Exponential means over the actions so far: turn beyond the bearing that was commanded, radians an action,
     /// and distance driven as a share of the distance that was commanded.
     pub residuals: [f64; 2],
-    /// The same as plain means over all actions so far, or over the last [`LONG_ACTIONS`] or so: what stays the same
+    /// The same as plain means over all actions so far, or over the last fifty or so: what stays the same
     /// for an episode shows here.
     pub long_residuals: [f64; 2],
     /// Actions behind these means.

@@ -182,7 +182,7 @@ impl OptionLibrary {
         self.unsaved.get_or_insert_default();
     }
 
-    /// Writes what was inserted since [`defer`](Self::defer).
+    /// Writes what was inserted and is not on disk yet.
     ///
     /// # Errors
     /// Returns an error that names the file that could not be written; it and all after it stay unsaved.
@@ -231,7 +231,7 @@ impl OptionLibrary {
         self.options.is_empty()
     }
 
-    /// Adds or replaces the option called `id`, on disk first unless that is [deferred](Self::defer).
+    /// Adds or replaces the option called `id`, on disk first unless the method saves at the end only.
     ///
     /// # Errors
     /// Returns an error that names the file that could not be written; memory is unchanged then.

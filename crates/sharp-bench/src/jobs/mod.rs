@@ -1,8 +1,8 @@
 //! Suites of experiments as jobs that any engine may run, anywhere and as often as it likes.
 //!
-//! A plan is a file, [`manifest`]: one line a job, with everything that decides its result. A job is a
+//! A plan is a file (`manifest.rs`): one line a job, with everything that decides its result. A job is a
 //! chain of problems that share an option library, or the problems of one baseline. Each problem is a
-//! transaction, [`step`]: a folder with its result, its plan and the library after it, which is there
+//! transaction (`step.rs`): a folder with its result, its plan and the library after it, which is there
 //! whole or not at all. So a job may be killed at any moment, started again, or run twice at once: what
 //! is there stays, what is missing is made, and the results are the same but for times.
 
