@@ -60,8 +60,9 @@ pub use json::to_json;
 pub use measure::{BaselineKind, BaselineSettings, MeasureMonitor, measure};
 pub use named::{InputError, NamedProblem};
 pub use prior::{
-    HELD_OUT, PolicyScore, PriorCourses, PriorEnd, PriorProgress, PriorRecipe, PriorStage, PriorTrainError,
-    prior_candidates, score_policies, train_prior,
+    CostError, CostRecipe, CostScore, FittedCost, HELD_OUT, PolicyScore, PriorCourses, PriorEnd,
+    PriorProgress, PriorRecipe, PriorStage, PriorTrainError, fit_cost, prior_candidates, score_cost,
+    score_policies, train_prior,
 };
 pub use reports::{
     BaselineReport, BaselineTimes, MapReport, OptionReport, Predicted, RunReport, SolveReport, Verified,

@@ -348,7 +348,9 @@ pub(crate) struct RegionsScore {
 pub(crate) enum PriorCommand {
     /// Train the policy that options begin with, on generated maps.
     Train(PriorTrain),
-    /// How often it holds on held-out kinds of map, beside the followers.
+    /// Fit the model of what it costs to drive on a prior.
+    Cost(PriorCost),
+    /// How often it holds on held-out kinds of map, beside the followers, and how well its cost is known.
     Score(PriorScore),
 }
 
@@ -385,6 +387,22 @@ pub(crate) struct PriorTrain {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct PriorCost {
+    /// husky, limo or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    pub(crate) robot: String,
+    /// The prior, as `sharp prior train` writes it [default: the shipped one].
+    #[arg(long, value_name = "FILE")]
+    pub(crate) from: Option<PathBuf>,
+    /// The file to write, safetensors.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// How long to drive: tiny takes seconds, default is the recipe of the shipped models.
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    pub(crate) preset: Preset,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct PriorScore {
     /// husky, limo or a robot file (.ron).
     #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
@@ -404,6 +422,9 @@ pub(crate) struct PriorScore {
     /// A prior's file instead of the shipped one.
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,
+    /// A cost model's file instead of the shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) cost: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]

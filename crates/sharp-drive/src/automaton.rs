@@ -37,7 +37,9 @@ impl Link {
         options.iter().enumerate().map(|(index, option)| Self::new(Arc::clone(option), next(index))).collect()
     }
 
-    fn guide(&self) -> GuideView<'_> {
+    /// Its guide, and the one after it where it is known.
+    #[must_use]
+    pub fn guide(&self) -> GuideView<'_> {
         let next: Option<&GuidePath> = self.next.as_deref().map(|next| &next.guide);
         GuideView { current: &self.option.guide, next }
     }

@@ -26,7 +26,7 @@ const BLOCK: u32 = 128;
 /// What a failure costs by default, seconds: somebody has to walk there and free the robot.
 pub const FAILURE_COST_S: f64 = 1000.0;
 /// Success rate below which costs do not rise further: no division by zero.
-const RATE_MIN: f64 = 1e-3;
+pub(crate) const RATE_MIN: f64 = 1e-3;
 
 impl SuccessEstimate {
     /// The estimate of `ends`: for each episode whether it succeeded, and its time in seconds.

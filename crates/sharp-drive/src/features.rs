@@ -1,8 +1,10 @@
 //! Situations as vectors, for networks.
 
+use std::sync::LazyLock;
+
 use sharp_guide::GuidePath;
 use sharp_sim::Drive;
-use sharp_space::{Pose, Vector, trig};
+use sharp_space::{Heading, Point, Pose, Vector, trig};
 
 use crate::network::PolicyContext;
 use crate::situation::{Observation, Situation};
@@ -31,6 +33,12 @@ const OUTLINE: [(f64, f64); 12] = [
 ];
 /// Clearance beyond which more makes no difference, metres: beside the outline, and along the guide.
 const CLEARANCE_MAX_M: [f64; 2] = [0.4, 0.8];
+
+/// The rays' directions in the robot's frame, the first straight ahead.
+static RAY_DIRECTIONS: LazyLock<[Vector; RAYS]> = LazyLock::new(|| {
+    let angle_rad = |ray| std::f64::consts::TAU * ray as f64 / RAYS as f64;
+    std::array::from_fn(|ray| Heading::new(angle_rad(ray)).unit())
+});
 
 /// Length of [`guide_features`].
 pub(crate) const GUIDE_FEATURES: usize =
@@ -85,20 +93,22 @@ fn put_guide(situation: &Situation<'_>, to: &mut Writer<'_>) {
     let Situation { world, observation, progress, guide } = situation;
     let (field, ahead_max_m) = (world.geometry.clearance(), CLEARANCE_MAX_M[1]);
     let (pose, half_width_m) = (&observation.state.pose, world.robot.footprint.half_width_m());
+    let robot = pose.frame();
     for ahead_m in LOOK_AHEAD_M {
         let ahead = guide.ahead(progress.arc_m + ahead_m);
-        let local = pose.to_local(ahead.position);
+        let local = robot.to_local(ahead.position);
         to.put(local.x.clamp(-3.0, 3.0) / 2.0);
         to.put(local.y.clamp(-3.0, 3.0) / 2.0);
         to.put(pose.heading.turn_to(ahead.heading) / std::f64::consts::PI);
         let clearance_m = field.sample(ahead.position) - world.robot.footprint.inscribed_radius_m();
         to.put(clearance_m.clamp(0.0, ahead_max_m) / ahead_max_m);
+        let along = ahead.frame();
         for side_m in [half_width_m, -half_width_m] {
-            let flank = ahead.to_world(Vector::new(0.0, side_m));
+            let flank = along.to_world(Vector::new(0.0, side_m));
             to.put(field.sample(flank).clamp(0.0, ahead_max_m) / ahead_max_m);
         }
     }
-    let end = pose.to_local(guide.current.end().position);
+    let end = robot.to_local(guide.current.end().position);
     to.put(end.x.clamp(-4.0, 4.0) / 4.0);
     to.put(end.y.clamp(-4.0, 4.0) / 4.0);
     to.put(f64::from(u8::from(guide.next.is_none())));
@@ -106,15 +116,15 @@ fn put_guide(situation: &Situation<'_>, to: &mut Writer<'_>) {
 
 fn put_surroundings(situation: &Situation<'_>, to: &mut Writer<'_>) {
     let (world, pose) = (situation.world, &situation.observation.state.pose);
-    for ray in 0..RAYS {
-        let angle = pose.heading.radians() + std::f64::consts::TAU * ray as f64 / RAYS as f64;
-        to.put(ray_length_m(world, pose, angle) / RAY_LENGTH_M);
+    let robot = pose.frame();
+    for direction in &*RAY_DIRECTIONS {
+        to.put(ray_length_m(world, pose.position, robot.turn(*direction)) / RAY_LENGTH_M);
     }
     let (field, beside_max_m) = (world.geometry.clearance(), CLEARANCE_MAX_M[0]);
     let footprint = &world.robot.footprint;
     for (ahead, left) in OUTLINE {
         let corner = Vector::new(ahead * footprint.half_length_m(), left * footprint.half_width_m());
-        to.put(field.sample(pose.to_world(corner)).clamp(0.0, beside_max_m) / beside_max_m);
+        to.put(field.sample(robot.to_world(corner)).clamp(0.0, beside_max_m) / beside_max_m);
     }
 }
 
@@ -133,15 +143,13 @@ fn put_memory(situation: &Situation<'_>, to: &mut Writer<'_>) {
     }
 }
 
-/// Free length from the robot's centre along `angle_rad`, metres, by sphere tracing.
-fn ray_length_m(world: &World, pose: &Pose, angle_rad: f64) -> f64 {
+/// Free length from `start` along the unit vector `direction`, metres, by sphere tracing.
+fn ray_length_m(world: &World, start: Point, direction: Vector) -> f64 {
     let field = world.geometry.clearance();
     let half_cell_m = 0.5 * field.frame().resolution_m;
-    let (sin, cos) = trig::sin_cos(angle_rad);
-    let direction = Vector::new(cos, sin);
     let mut length_m = 0.0;
     while length_m < RAY_LENGTH_M {
-        let point = pose.position + direction * length_m;
+        let point = start + direction * length_m;
         let distance_m = field.frame().cell_at(point).map_or(0.0, |cell| field.at(cell));
         if distance_m <= half_cell_m {
             return length_m;
@@ -175,7 +183,7 @@ mod tests {
         for (x, y, angle, expected_m) in
             [(1.0, 2.0, std::f64::consts::PI, 0.6), (5.0, 1.0, -1.57, 0.6), (5.0, 2.0, 0.0, RAY_LENGTH_M)]
         {
-            let length_m = ray_length_m(&world, &Pose::new(x, y, 0.0), angle);
+            let length_m = ray_length_m(&world, Point::new(x, y), Heading::new(angle).unit());
             assert!((length_m - expected_m).abs() < 0.4, "from ({x}, {y}) at {angle}: {length_m} m");
         }
     }

@@ -31,6 +31,7 @@ pub mod conformance;
 mod automaton;
 mod chain;
 mod command;
+mod cost;
 mod count;
 mod episode;
 mod estimate;
@@ -57,6 +58,7 @@ mod test_worlds;
 pub use automaton::{Automaton, Link, Visit};
 pub use chain::{ChainRun, Driver};
 pub use command::Command;
+pub use cost::{CostModel, DriveRow, DriveRows, PredictedCost, drive_rows};
 pub use count::SuccessCount;
 pub use episode::{
     Controller, Decision, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Motion, Readiness, Supervisor,

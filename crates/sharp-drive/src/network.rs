@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sharp_rl::{Actor, ActorScratch};
+use sharp_rl::{Actor, DeployedActor, DeployedScratch};
 use sharp_sim::NoiseModel;
 use sharp_space::Vector;
 
@@ -140,6 +140,7 @@ pub struct NetworkPolicy {
     pub interface: PolicyInterface,
     /// The network; copies of the policy share it.
     pub actor: Arc<Actor>,
+    deployed: Arc<DeployedActor>,
     scratch: NetworkScratch,
 }
 
@@ -148,7 +149,7 @@ pub struct NetworkPolicy {
 struct NetworkScratch {
     features: Vec<f32>,
     action: [f32; PolicyInterface::ACTION_LEN],
-    actor: ActorScratch,
+    actor: DeployedScratch,
 }
 
 impl Clone for NetworkScratch {
@@ -162,7 +163,17 @@ impl NetworkPolicy {
     /// The policy of `actor`.
     #[must_use]
     pub fn new(interface: PolicyInterface, actor: Arc<Actor>) -> Self {
-        Self { interface, actor, scratch: NetworkScratch::default() }
+        let deployed = Arc::new(DeployedActor::new(&actor));
+        Self::shared(interface, actor, deployed)
+    }
+
+    /// The policy of `actor`, which `deployed` is made of.
+    pub(crate) fn shared(
+        interface: PolicyInterface,
+        actor: Arc<Actor>,
+        deployed: Arc<DeployedActor>,
+    ) -> Self {
+        Self { interface, actor, deployed, scratch: NetworkScratch::default() }
     }
 }
 
@@ -171,7 +182,7 @@ impl Policy for NetworkPolicy {
         let NetworkScratch { features, action, actor } = &mut self.scratch;
         features.resize(self.interface.observation_len(), 0.0);
         self.interface.observe(situation, features);
-        self.actor.act_mean(features, actor, action);
+        self.deployed.act(features, actor, action);
         self.interface.command(situation, action)
     }
 

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
-use sharp_rl::{Actor, StoreError};
+use sharp_rl::{Actor, DeployedActor, StoreError};
 use sharp_sim::{NoiseModel, RobotModel};
 
 use crate::follower::{Follower, SteeringRule};
@@ -28,6 +28,7 @@ const FORMAT_NOTE: (&str, &str) = ("prior-format", "2");
 pub struct Prior {
     /// Shared by all policies that are made of it.
     actor: Arc<Actor>,
+    deployed: Arc<DeployedActor>,
 }
 
 impl Prior {
@@ -41,7 +42,8 @@ impl Prior {
         if spec.observation_len != expected || spec.action_len != PolicyInterface::ACTION_LEN {
             return Err(StoreError::Header(format!("a network of {spec:?}, a prior has {expected} and 2")));
         }
-        Ok(Self { actor: Arc::new(actor) })
+        let deployed = Arc::new(DeployedActor::new(&actor));
+        Ok(Self { actor: Arc::new(actor), deployed })
     }
 
     /// Reads a prior from the bytes of a safetensors file.
@@ -93,7 +95,8 @@ impl Prior {
     #[must_use]
     pub fn at(&self, caution: f32, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
         let interface = prior_interface(robot, PolicyContext::new(noise, caution));
-        OptionPolicy::Network(NetworkPolicy::new(interface, Arc::clone(&self.actor)))
+        let (actor, deployed) = (Arc::clone(&self.actor), Arc::clone(&self.deployed));
+        OptionPolicy::Network(NetworkPolicy::shared(interface, actor, deployed))
     }
 }
 

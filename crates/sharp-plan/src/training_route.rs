@@ -8,8 +8,9 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use sharp_drive::{
-    Driver, InitialStates, Link, MonteCarlo, OptionPolicy, PolicyContext, PolicyInterface, Scenario,
-    ScenarioSource, SuccessEstimate, World, prior_interface,
+    CostModel, DriveRow, Driver, InitialStates, Link, MonteCarlo, OptionPolicy, PolicyContext,
+    PolicyInterface, PredictedCost, Prior, Scenario, ScenarioSource, SuccessEstimate, World, drive_rows,
+    prior_interface,
 };
 use sharp_guide::{GuidedOption, ProgressReward, join_guides};
 use sharp_sim::{ActionSettings, NoiseModel, SimulatorKind};
@@ -67,6 +68,41 @@ impl TrainingRoute {
             trial.estimate(&[Driver::new(option, policy, self.options.get(index + 1))], states)
         };
         options.map(of).collect()
+    }
+
+    /// Drives from option number `first` to the end of the route with `prior`, told this `caution`, so many times under
+    /// `noise`, and appends what its places showed to `rows`.
+    ///
+    /// # Panics
+    /// If there is no such option.
+    pub fn drive_rows(
+        &self,
+        (prior, first, caution): (&Prior, usize, f32),
+        noise: &NoiseModel,
+        (episodes, seed): (u32, Seed),
+        rows: &mut Vec<DriveRow>,
+    ) {
+        let Self { world, options, states } = self;
+        let simulator = world.simulator(SimulatorKind::Kinematic);
+        let (policy, context) = (prior.at(caution, &world.robot, noise), PolicyContext::new(noise, caution));
+        let links = Link::chain(&options[first..]);
+        drive_rows(
+            (world, &*simulator, noise),
+            (&links, &policy, context),
+            (&states[first], first == 0),
+            (episodes, seed),
+            rows,
+        );
+    }
+
+    /// What `model` says of each option where the prior is told this `caution`.
+    #[must_use]
+    pub fn predict(&self, model: &CostModel, noise: &NoiseModel, caution: f32) -> Vec<PredictedCost> {
+        let links = Link::chain(&self.options);
+        let of = |(index, link): (usize, &Link)| {
+            model.predict(&self.world, (&link.guide(), index == 0), noise, &[caution]).remove(0)
+        };
+        links.iter().enumerate().map(of).collect()
     }
 }
 
@@ -171,7 +207,7 @@ fn interface(world: &World, context: PolicyContext) -> PolicyInterface {
 
 #[cfg(test)]
 mod tests {
-    use sharp_drive::{OptionTask, Prior};
+    use sharp_drive::OptionTask;
     use sharp_options::OptionKind;
     use sharp_rl::conformance::check_environment;
     use sharp_rl::{Actor, Environment, evaluate};

@@ -41,6 +41,7 @@ mod adam;
 mod buffer;
 #[cfg(any(feature = "burn", test))]
 mod burn_sac;
+mod deployed;
 mod environment;
 mod error;
 mod evaluation;
@@ -52,6 +53,7 @@ mod n_step;
 mod network;
 mod normaliser;
 mod ppo;
+mod regression;
 mod sac;
 mod sac_learner;
 mod sac_state;
@@ -69,6 +71,7 @@ pub mod toy;
 pub use actor::{Actor, ActorError, ActorScratch};
 pub use adam::Adam;
 pub use buffer::{Batch, ReplayBuffer, ReplayTransition, SampleSettings};
+pub use deployed::{DeployedActor, DeployedMlp, DeployedScratch};
 pub use environment::{Environment, EnvironmentSpec, ForkEnvironment, Step, Stream};
 pub use error::TrainError;
 pub use evaluation::{Evaluation, evaluate};
@@ -81,6 +84,7 @@ pub use ppo::{
     BatchEnvironment, BatchSpec, BatchStep, FailurePrice, PpoBudget, PpoLearner, PpoSettings, PpoState,
     Schedule, SeenBatch, resume_ppo, train_ppo,
 };
+pub use regression::{FitError, FitSettings, Samples, fit};
 pub use sac::{Sac, UpdateReport};
 pub use sac_learner::{SacLearner, SacStart};
 pub use sac_state::SacState;

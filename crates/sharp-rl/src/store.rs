@@ -78,9 +78,31 @@ pub enum StoreError {
 }
 
 #[derive(Serialize, Deserialize)]
-struct ActorHeader {
+struct NetworkHeader {
     sizes: Vec<usize>,
     notes: BTreeMap<String, String>,
+}
+
+impl Mlp {
+    const KIND: &'static str = "network";
+
+    /// The network as bytes of a safetensors file, with free text `notes` of the caller.
+    #[must_use]
+    pub fn to_bytes(&self, notes: &BTreeMap<String, String>) -> Vec<u8> {
+        let mut writer = TensorWriter::default();
+        writer.network("network", self);
+        writer.finish(Self::KIND, &NetworkHeader { sizes: self.sizes().to_vec(), notes: notes.clone() })
+    }
+
+    /// Reads what [`Self::to_bytes`] wrote, bit for bit, and its notes.
+    ///
+    /// # Errors
+    /// If the bytes are truncated, of another version or kind, of inconsistent shapes, or hold a
+    /// value that is not finite.
+    pub fn from_bytes(bytes: &[u8]) -> Result<(Self, BTreeMap<String, String>), StoreError> {
+        let (reader, header) = TensorReader::open::<NetworkHeader>(bytes, Self::KIND)?;
+        Ok((reader.network("network", &header.sizes)?, header.notes))
+    }
 }
 
 impl Actor {
@@ -91,7 +113,7 @@ impl Actor {
     pub fn to_bytes(&self, notes: &BTreeMap<String, String>) -> Vec<u8> {
         let mut writer = TensorWriter::default();
         writer.actor("actor", self);
-        let header = ActorHeader { sizes: self.network().sizes().to_vec(), notes: notes.clone() };
+        let header = NetworkHeader { sizes: self.network().sizes().to_vec(), notes: notes.clone() };
         writer.finish(Self::KIND, &header)
     }
 
@@ -101,7 +123,7 @@ impl Actor {
     /// If the bytes are truncated, of another version or kind, of inconsistent shapes, or hold a
     /// value that is not finite.
     pub fn from_bytes(bytes: &[u8]) -> Result<(Self, BTreeMap<String, String>), StoreError> {
-        let (reader, header) = TensorReader::open::<ActorHeader>(bytes, Self::KIND)?;
+        let (reader, header) = TensorReader::open::<NetworkHeader>(bytes, Self::KIND)?;
         Ok((reader.actor("actor", &header.sizes)?, header.notes))
     }
 }

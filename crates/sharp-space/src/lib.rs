@@ -37,6 +37,6 @@ pub use distance_field::DistanceField;
 pub use footprint::{Footprint, FootprintError};
 pub use geometry::RobotGeometry;
 pub use grid::{Cell, GridError, GridFrame, Occupancy, OccupancyGrid};
-pub use pose::{Heading, Point, Pose, Vector, wrap_angle};
+pub use pose::{Heading, Point, Pose, PoseFrame, Vector, wrap_angle};
 pub use region::{Region, RegionId};
 pub use seed::{Seed, Stream};

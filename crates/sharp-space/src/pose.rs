@@ -60,8 +60,15 @@ impl Heading {
     #[inline]
     #[must_use]
     pub fn unit(self) -> Vector {
-        let (sin, cos) = trig::sin_cos(self.0);
+        let (sin, cos) = self.sin_cos();
         Vector::new(cos, sin)
+    }
+
+    /// Its sine and cosine. Grids that are not turned ask for those of zero all the time.
+    #[inline]
+    #[must_use]
+    pub fn sin_cos(self) -> (f64, f64) {
+        if self.0 == 0.0 { (0.0, 1.0) } else { trig::sin_cos(self.0) }
     }
 }
 
@@ -124,17 +131,22 @@ impl Pose {
     #[inline]
     #[must_use]
     pub fn to_local(&self, point: Point) -> Vector {
-        let (sin, cos) = trig::sin_cos(self.heading.0);
-        let d = point - self.position;
-        Vector::new(cos * d.x + sin * d.y, -sin * d.x + cos * d.y)
+        self.frame().to_local(point)
     }
 
     /// Expresses `local` (x ahead, y to the left) in the world frame.
     #[inline]
     #[must_use]
     pub fn to_world(&self, local: Vector) -> Point {
-        let (sin, cos) = trig::sin_cos(self.heading.0);
-        self.position + Vector::new(cos * local.x - sin * local.y, sin * local.x + cos * local.y)
+        self.frame().to_world(local)
+    }
+
+    /// The pose's frame, for transforming many points.
+    #[inline]
+    #[must_use]
+    pub fn frame(&self) -> PoseFrame {
+        let (sin, cos) = self.heading.sin_cos();
+        PoseFrame { position: self.position, sin, cos }
     }
 
     /// Euclidean distance of the positions, metres; headings do not count.
@@ -151,6 +163,46 @@ impl Pose {
             position: self.position + (other.position - self.position) * t,
             heading: Heading::new(self.heading.0 + t * self.heading.turn_to(other.heading)),
         }
+    }
+}
+
+/// The frame of a [`Pose`], with its trigonometry done: the same results, faster for many points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseFrame {
+    position: Point,
+    sin: f64,
+    cos: f64,
+}
+
+impl PoseFrame {
+    /// [`Pose::to_local`].
+    #[inline]
+    #[must_use]
+    pub fn to_local(&self, point: Point) -> Vector {
+        self.turn_back(point - self.position)
+    }
+
+    /// [`Pose::to_world`].
+    #[inline]
+    #[must_use]
+    pub fn to_world(&self, local: Vector) -> Point {
+        self.position + self.turn(local)
+    }
+
+    /// A direction of this frame (x ahead, y to the left) in the world.
+    #[inline]
+    #[must_use]
+    pub fn turn(&self, local: Vector) -> Vector {
+        let Self { sin, cos, .. } = *self;
+        Vector::new(cos * local.x - sin * local.y, sin * local.x + cos * local.y)
+    }
+
+    /// A direction of the world in this frame.
+    #[inline]
+    #[must_use]
+    pub fn turn_back(&self, world: Vector) -> Vector {
+        let Self { sin, cos, .. } = *self;
+        Vector::new(cos * world.x + sin * world.y, -sin * world.x + cos * world.y)
     }
 }
 

@@ -4,11 +4,13 @@
 //! them one after the other. [`score_policies`] drives policies on routes of kinds of map that no prior was trained
 //! on. `docs/algorithms/prior.md` says why the numbers are what they are.
 
+mod cost;
 mod courses;
 mod recipe;
 mod score;
 mod train;
 
+pub use cost::{CostError, CostRecipe, CostScore, FittedCost, fit_cost, score_cost};
 pub use courses::{HELD_OUT, PriorCourses};
 pub use recipe::{PriorRecipe, PriorStage};
 pub use score::{PolicyScore, prior_candidates, score_policies};

@@ -1,4 +1,4 @@
-//! `sharp prior train|score`: the policy that every option begins with.
+//! `sharp prior train|cost|score`: the policy that every option begins with.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -7,14 +7,15 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use sharp_bench::{
-    CurveFolder, PolicyScore, PriorCourses, PriorEnd, PriorProgress, PriorRecipe, named, prior_candidates,
-    score_policies, train_prior,
+    CostRecipe, CostScore, CurveFolder, PolicyScore, PriorCourses, PriorEnd, PriorProgress, PriorRecipe,
+    fit_cost, named, prior_candidates, score_cost, score_policies, train_prior,
 };
-use sharp_drive::Prior;
+use sharp_drive::{CostModel, Prior};
 use sharp_plan::{TrainingRoute, write_atomic};
+use sharp_sim::RobotModel;
 use sharp_space::Seed;
 
-use crate::args::{PriorCommand, PriorScore, PriorTrain};
+use crate::args::{Preset, PriorCommand, PriorCost, PriorScore, PriorTrain};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress;
 
@@ -48,11 +49,30 @@ struct PriorScoreReport {
     legs: usize,
     episodes: u32,
     policies: BTreeMap<String, PolicyScore>,
+    /// How well the cost of the options is known beforehand, at full caution.
+    cost: CostScore,
+}
+
+/// `sharp.prior.cost/1`.
+#[derive(Serialize)]
+struct PriorCostReport {
+    schema: &'static str,
+    robot: String,
+    seed: u64,
+    preset: &'static str,
+    file: String,
+    /// Places under one noise and caution.
+    rows: usize,
+    failures: f64,
+    /// Mean loss of each epoch.
+    losses: Vec<f64>,
+    time_s: f64,
 }
 
 pub(crate) fn run(command: &PriorCommand, seed: u64, json: bool) -> Result<Exit, Failure> {
     match command {
         PriorCommand::Train(args) => run_train(args, seed, json),
+        PriorCommand::Cost(args) => run_cost(args, seed, json),
         PriorCommand::Score(args) => run_score(args, seed, json),
     }
 }
@@ -176,21 +196,65 @@ fn invalid(path: &Path, error: &dyn std::fmt::Display) -> Failure {
     Failure::new("FILE_INVALID", format!("{}: {error}", path.display()))
 }
 
+/// The prior in `file`, or the shipped one of `robot`.
+fn prior_of(file: Option<&Path>, robot: &RobotModel) -> Result<Prior, Failure> {
+    file.map_or_else(|| Ok(Prior::shipped(robot).clone()), prior_file)
+}
+
+fn run_cost(args: &PriorCost, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let begun = Instant::now();
+    let robot = named::robot(&args.robot)?;
+    let prior = prior_of(args.from.as_deref(), &robot)?;
+    let recipe = match args.preset {
+        Preset::Tiny => CostRecipe::tiny(),
+        Preset::Default => CostRecipe::shipped(),
+    };
+    let bar = progress::bar(u64::from(recipe.map_count), "planning courses");
+    let fitted = fit_cost((&robot, &prior, &recipe, Seed(seed)), &|| bar.inc(1));
+    bar.finish_and_clear();
+    let fitted = fitted.map_err(|error| Failure::new("TRAINING", error.to_string()))?;
+    write_atomic(&args.out, &fitted.model.to_bytes())?;
+    let report = PriorCostReport {
+        schema: "sharp.prior.cost/1",
+        robot: robot.name,
+        seed,
+        preset: args.preset.name(),
+        file: args.out.display().to_string(),
+        rows: fitted.rows,
+        failures: fitted.failures,
+        losses: fitted.losses,
+        time_s: begun.elapsed().as_secs_f64(),
+    };
+    if json {
+        say!("{}", to_json(&report));
+    } else {
+        let PriorCostReport { file, rows, failures, time_s, .. } = &report;
+        say!("{file}: fitted to {rows} places with {failures} failures, {time_s:.0} s");
+    }
+    Ok(Exit::Done)
+}
+
 fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> {
     let robot = named::robot(&args.robot)?;
     let noise = named::noise(&args.noise)?;
     let bar = progress::bar(u64::from(args.maps), "planning courses");
     let courses = PriorCourses::held_out(&robot, Seed(seed)).routes(args.maps, &|| bar.inc(1));
     bar.finish_and_clear();
-    let prior = match &args.from {
-        None => Prior::shipped(&robot).clone(),
-        Some(file) => prior_file(file)?,
+    let prior = prior_of(args.from.as_deref(), &robot)?;
+    let model = match &args.cost {
+        None => CostModel::shipped(&robot).clone(),
+        Some(file) => {
+            let missing = || Failure::new("FILE_UNREADABLE", format!("{}: no such file", file.display()));
+            CostModel::from_bytes(&read(file)?.ok_or_else(missing)?).map_err(|error| invalid(file, &error))?
+        }
     };
     let mut policies = prior_candidates(&prior, &robot, &noise);
     if args.prior_only {
         policies.retain(|(name, _)| name.starts_with("prior"));
     }
     let policies = score_policies(&courses, policies, &noise, (args.episodes, Seed(seed)));
+    let drive = (args.episodes, Seed(seed));
+    let cost = score_cost((&model, &prior), (&courses, &robot), (&noise, 1.0), drive);
     let legs = courses.iter().map(TrainingRoute::len).sum();
     let report = PriorScoreReport {
         schema: "sharp.prior.score/1",
@@ -199,6 +263,7 @@ fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> 
         legs,
         episodes: args.episodes,
         policies,
+        cost,
     };
     if json {
         say!("{}", to_json(&report));
@@ -209,5 +274,10 @@ fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> 
         let PolicyScore { success, legs_at_99, worst_leg, mean_sim_time_s } = score;
         say!("| {name} | {success:.4} | {legs_at_99:.2} | {worst_leg:.2} | {mean_sim_time_s:.2} |");
     }
+    let CostScore { time_s, predicted_time_s, failure, predicted_failure, failure_correlation, .. } = cost;
+    say!(
+        "Cost model at full caution: time {predicted_time_s:.2} s for {time_s:.2} s, failures {predicted_failure:.4} \
+         for {failure:.4}, correlation {failure_correlation:.2}"
+    );
     Ok(Exit::Done)
 }

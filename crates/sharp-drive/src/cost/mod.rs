@@ -1,0 +1,155 @@
+//! What driving along a guide costs, known before anybody drives: time and risk by the place.
+//!
+//! A small network looks at each place of a guide: the room around it, the bends behind and ahead, the noise, and how
+//! careful the prior is told to be. It says how long the prior takes for the next quarter of a metre and how often it
+//! fails there. The sums along a guide are its time and its risk, for guides of any length. The network is fitted to
+//! drives of the prior on generated maps (`docs/algorithms/prior.md`), so that it knows the prior and nothing else.
+
+mod drives;
+mod places;
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, LazyLock};
+
+use sharp_rl::{DeployedMlp, DeployedScratch, Mlp, StoreError};
+use sharp_sim::{NoiseModel, RobotModel};
+
+use crate::estimate::RATE_MIN;
+use crate::network::PolicyContext;
+use crate::situation::GuideView;
+use crate::world::World;
+
+pub use drives::{DriveRow, DriveRows, drive_rows};
+use places::{PLACE_LEN, Place};
+
+/// Length of guide that a prediction speaks of, metres.
+pub(crate) const BIN_M: f64 = 0.25;
+/// The note in a model's file that says what its inputs and outputs mean, and the only value that is read.
+const FORMAT_NOTE: (&str, &str) = ("cost-format", "1");
+
+/// Predicts what the prior of a kind of robot needs for a guide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CostModel {
+    network: Mlp,
+    deployed: Arc<DeployedMlp>,
+}
+
+/// What driving along a guide is predicted to cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PredictedCost {
+    /// Mean time, seconds.
+    pub time_s: f64,
+    /// Expected number of failures of a robot that would go on after each: the chance of success is its
+    /// exponential, e^(−`risk`).
+    pub risk: f64,
+}
+
+impl PredictedCost {
+    /// The chance to arrive.
+    #[must_use]
+    pub fn success(&self) -> f64 {
+        (-self.risk).exp()
+    }
+
+    /// The expected cost of a use, seconds: mean time per success, and `failure_cost_s` for each failure.
+    #[must_use]
+    pub fn cost_s(&self, failure_cost_s: f64) -> f64 {
+        let success = self.success().max(RATE_MIN);
+        self.time_s / success + failure_cost_s * (1.0 - success)
+    }
+}
+
+impl CostModel {
+    /// Numbers that the network is given for a place, the context included.
+    pub const INPUTS: usize = PLACE_LEN + PolicyContext::LEN;
+    /// What it says of a place: the logarithms of the time, seconds, and of the risk of the next quarter of a metre.
+    pub const OUTPUTS: usize = 2;
+
+    /// The model that `network` was fitted to be.
+    ///
+    /// # Errors
+    /// If the network has other inputs or outputs.
+    pub fn new(network: Mlp) -> Result<Self, StoreError> {
+        let sizes = network.sizes();
+        let (inputs, outputs) = (sizes[0], sizes[sizes.len() - 1]);
+        if (inputs, outputs) != (Self::INPUTS, Self::OUTPUTS) {
+            let expected = (Self::INPUTS, Self::OUTPUTS);
+            return Err(StoreError::Header(format!(
+                "a network of {inputs} inputs and {outputs} outputs, a cost model has {expected:?}"
+            )));
+        }
+        let deployed = Arc::new(DeployedMlp::new(&network));
+        Ok(Self { network, deployed })
+    }
+
+    /// Reads a model from the bytes of a safetensors file.
+    ///
+    /// # Errors
+    /// If the bytes are no network, or not of a cost model's inputs and outputs.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, StoreError> {
+        let (network, notes) = Mlp::from_bytes(bytes)?;
+        let (name, expected) = FORMAT_NOTE;
+        match notes.get(name).map(String::as_str) {
+            Some(found) if found == expected => Self::new(network),
+            found => Err(StoreError::Header(format!("{name} is {found:?}, expected {expected:?}"))),
+        }
+    }
+
+    /// The model as bytes of a safetensors file.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let (name, format) = FORMAT_NOTE;
+        self.network.to_bytes(&BTreeMap::from([(name.to_owned(), format.to_owned())]))
+    }
+
+    /// The model of the shipped prior for robots that move as `robot` does.
+    #[must_use]
+    pub fn shipped(robot: &RobotModel) -> &'static Self {
+        let [turning, steering] = &*SHIPPED;
+        if robot.can_turn_in_place() { turning } else { steering }
+    }
+
+    /// What `guide` costs under `noise` for each of `cautions`, 0 to 1; `from_rest` where the robot stands at its
+    /// beginning.
+    #[must_use]
+    pub fn predict(
+        &self,
+        world: &World,
+        (guide, from_rest): (&GuideView<'_>, bool),
+        noise: &NoiseModel,
+        cautions: &[f32],
+    ) -> Vec<PredictedCost> {
+        let contexts: Vec<PolicyContext> =
+            cautions.iter().map(|&caution| PolicyContext::new(noise, caution)).collect();
+        let mut costs = vec![PredictedCost::default(); cautions.len()];
+        let (mut scratch, mut input) = (DeployedScratch::default(), [0.0; Self::INPUTS]);
+        let length_m = guide.current.length_m();
+        let count = (length_m / BIN_M).ceil().max(1.0) as usize;
+        for bin in 0..count {
+            let arc_m = bin as f64 * BIN_M;
+            let share = ((length_m - arc_m) / BIN_M).min(1.0);
+            Place { arc_m, from_rest }.write(world, guide, &mut input[..PLACE_LEN]);
+            for (context, cost) in contexts.iter().zip(&mut costs) {
+                input[PLACE_LEN..].copy_from_slice(&context.entries());
+                let said = self.deployed.predict(&input, &mut scratch);
+                cost.time_s += share * exp(said[0]);
+                cost.risk += share * exp(said[1]);
+            }
+        }
+        costs
+    }
+}
+
+/// The exponential of a logarithm that a network says, kept in a range that sums can bear.
+fn exp(logarithm: f32) -> f64 {
+    libm::exp(f64::from(logarithm.clamp(-20.0, 5.0)))
+}
+
+/// Of the shipped priors: for robots that turn in place, and for cars.
+static SHIPPED: LazyLock<[CostModel; 2]> = LazyLock::new(|| {
+    let read = |bytes| CostModel::from_bytes(bytes).expect("a test reads every shipped model");
+    [
+        read(include_bytes!("../../assets/cost-husky.safetensors")),
+        read(include_bytes!("../../assets/cost-limo.safetensors")),
+    ]
+});
