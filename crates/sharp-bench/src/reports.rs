@@ -90,7 +90,7 @@ pub struct OptionReport {
 }
 
 impl OptionReport {
-    fn new(planned: &PlannedOption, plan: &Plan) -> Self {
+    fn new(planned: &PlannedOption, price_s: f64, plan: &Plan) -> Self {
         let PlannedOption { option, learnt, reused, on_arrival, arrival_time_s } = planned;
         Self {
             option: option.id.to_string(),
@@ -106,7 +106,7 @@ impl OptionReport {
             length_m: option.guide.length_m(),
             time_s: arrival_time_s.is_finite().then_some(*arrival_time_s),
             cost_s: learnt.cost_s(plan.method.failure_cost_s),
-            price_s: plan.method.search.price_s(&plan.world, &plan.noise, &option.guide),
+            price_s,
         }
     }
 }
@@ -175,10 +175,11 @@ impl SolveReport {
     pub(crate) fn with_plan(self, plan: &Plan) -> Self {
         let solution = &plan.solution;
         let (uses, reused) = solution.reuse();
-        let report = |step| OptionReport::new(step, plan);
+        let steps = solution.steps.iter().zip(plan.prices_s());
+        let report = |(step, price_s)| OptionReport::new(step, price_s, plan);
         Self {
             status: "solved",
-            plan: solution.steps.iter().map(report).collect(),
+            plan: steps.map(report).collect(),
             reuse: Reuse { uses, reused },
             predicted: Some(Predicted {
                 success: solution.predicted.rate(),

@@ -50,6 +50,13 @@ impl SuccessCount {
         self.wilson().1
     }
 
+    /// Half the width of the 95 % Wilson score interval; one half before the first trial.
+    #[must_use]
+    pub fn half_width95(&self) -> f64 {
+        let (lower, upper) = self.wilson();
+        0.5 * (upper - lower)
+    }
+
     /// E. B. Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", 1927.
     fn wilson(&self) -> (f64, f64) {
         if self.episodes == 0 {

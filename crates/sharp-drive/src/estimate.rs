@@ -125,6 +125,25 @@ impl<'a> MonteCarlo<'a> {
         })
     }
 
+    /// The same, but stops after a block of runs as soon as `is_enough` of all so far.
+    #[must_use]
+    pub fn runs_until(
+        &self,
+        drivers: &[Driver<'_>],
+        start: RobotState,
+        is_enough: impl Fn(&[ChainRun]) -> bool,
+    ) -> Vec<ChainRun> {
+        let mut runs = Vec::with_capacity(self.episodes as usize);
+        while runs.len() < self.episodes as usize && (runs.is_empty() || !is_enough(&runs)) {
+            let next = runs.len() as u32;
+            let block = next..self.episodes.min(next + BLOCK);
+            runs.extend(self.parallel(drivers, block, |chain, episode, number| {
+                chain.run(self.world, episode, start, (self.seed, number))
+            }));
+        }
+        runs
+    }
+
     /// Results come in the order of the episodes, whatever thread ran them.
     fn parallel<T: Send>(
         &self,

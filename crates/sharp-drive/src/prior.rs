@@ -15,8 +15,6 @@ use crate::follower::{Follower, SteeringRule};
 use crate::network::{Correction, NetworkPolicy, PolicyContext, PolicyInterface};
 use crate::policy::OptionPolicy;
 
-/// Degrees of caution at which the prior is offered, the least first.
-const CAUTIONS: [f32; 5] = [0.0, 0.25, 0.5, 0.75, CAUTION];
 /// The degree of caution of a prior that is taken without a choice: at the usual price of a failure it costs least.
 const CAUTION: f32 = 1.0;
 
@@ -32,6 +30,9 @@ pub struct Prior {
 }
 
 impl Prior {
+    /// Degrees of caution at which the prior is offered, the least first.
+    pub const CAUTIONS: [f32; 5] = [0.0, 0.25, 0.5, 0.75, CAUTION];
+
     /// The prior that `actor` was trained to be.
     ///
     /// # Errors
@@ -82,7 +83,7 @@ impl Prior {
     /// Its policies for `robot` under `noise`, the least cautious first.
     #[must_use]
     pub fn candidates(&self, robot: &RobotModel, noise: &NoiseModel) -> Vec<OptionPolicy> {
-        CAUTIONS.into_iter().map(|caution| self.at(caution, robot, noise)).collect()
+        Self::CAUTIONS.into_iter().map(|caution| self.at(caution, robot, noise)).collect()
     }
 
     /// Its policy for `robot` under `noise` at full caution.
@@ -135,7 +136,7 @@ mod tests {
     fn every_shipped_prior_can_be_read_and_written() {
         for robot in [RobotModel::husky(), RobotModel::limo()] {
             let prior = Prior::shipped(&robot);
-            assert_eq!(prior.candidates(&robot, &NoiseModel::nominal()).len(), CAUTIONS.len());
+            assert_eq!(prior.candidates(&robot, &NoiseModel::nominal()).len(), Prior::CAUTIONS.len());
             let again = Prior::from_bytes(&prior.to_bytes()).expect("own bytes");
             assert_eq!(&again, prior, "written and read");
         }

@@ -97,6 +97,13 @@ fn algorithm_1(
         }
         let solution = verify(problem, &p, &policies);
         verified += 1;
+        eprintln!(
+            "DBG plan {:?} cost {:.2} {:?} time {:.1}",
+            names(&p).iter().map(|n| n.to_string()).collect::<Vec<_>>(),
+            solution.estimate().cost_s(method.failure_cost_s),
+            solution.predicted,
+            solution.predicted_time_s
+        );
         search.offer_direct();
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
         let cost_s = |solution: &Solution| solution.estimate().cost_s(method.failure_cost_s);
@@ -104,6 +111,12 @@ fn algorithm_1(
             best = Some(solution);
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
+        eprintln!(
+            "DBG verified {} best {best_s:.2} other {:.2} retry {}",
+            names(&p).len(),
+            other_s(&mut search, &policies),
+            method.retry_above
+        );
         if verified == VERIFIED_MAX || best_s <= method.retry_above * other_s(&mut search, &policies) {
             break;
         }
@@ -126,8 +139,7 @@ fn cheapest(
     search: &mut Search<'_>,
     policies: &Policies<'_>,
 ) -> Option<(f64, Vec<Arc<GuidedOption>>)> {
-    let cost_s = |id: LegId| policies.get(id).map(|learnt| learnt.cost_s(problem.method.failure_cost_s));
-    search.plan(&cost_s, problem.monitor)
+    search.plan(&|id| policies.get(id).map(|learnt| learnt.estimate), problem.monitor)
 }
 
 fn join(problem: &PlanningProblem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOption>> {
@@ -154,7 +166,8 @@ fn has_weak_option(
 fn charge_hand_overs(search: &mut Search<'_>, steps: &[PlannedOption], failure_cost_s: f64) {
     for pair in steps.windows(2) {
         let [before, after] = pair else { continue };
-        let loss = after.learnt.estimate.count.rate() - after.on_arrival.rate();
+        // A few episodes say little: only what they rule out is charged.
+        let loss = after.learnt.estimate.count.lower95() - after.on_arrival.rate();
         if after.on_arrival.episodes >= ENTERED_MIN && loss > 0.0 {
             search.charge(before.option.id, after.option.id, failure_cost_s * loss);
         }
@@ -195,10 +208,9 @@ mod tests {
 
     /// The default method with fewer episodes.
     fn quick() -> Method {
-        let screening_episodes = 50;
-        let fast = Method::fast().with_episodes(200, 100, 100);
-        let repair = RepairSettings { screening_episodes, ..fast.repair };
-        let learner = Selection { screening_episodes, ..Selection::default() };
+        let learner = Selection { screening_episodes: 50, judge_episodes: 200, ..Selection::default() };
+        let fast = Method::fast().with_episodes(100, 100, 100);
+        let repair = RepairSettings { judge_episodes: 200, ..fast.repair };
         Method { learner: Arc::new(learner), repair, ..fast }
     }
 

@@ -157,9 +157,8 @@ impl ComposedPolicy {
         if known.contains_key(&LegId::Direct) {
             search.offer_direct();
         }
-        let measured_s = |step: &&PlannedOption| step.learnt.cost_s(plan.method.failure_cost_s);
-        let cost_s = |id: LegId| known.get(&id).filter(|_| is_kept(&id)).map(measured_s);
-        let (_, options) = search.plan(&cost_s, &())?;
+        let measured = |id: LegId| known.get(&id).filter(|_| is_kept(&id)).map(|step| step.learnt.estimate);
+        let (_, options) = search.plan(&measured, &())?;
         let cautious = || OptionPolicy::Follower(Follower::cautious(&plan.world.robot));
         let policy = |option: &Arc<GuidedOption>| {
             known.get(&option.id).map_or_else(cautious, |step| step.learnt.policy.clone())

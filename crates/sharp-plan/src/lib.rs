@@ -40,6 +40,7 @@ mod method;
 mod option_graph;
 mod plan_file;
 mod policies;
+mod price;
 mod problem;
 mod query;
 mod reason;

@@ -26,7 +26,7 @@ use crate::method::Method;
 use crate::plan_file::map_hash;
 
 /// Raised whenever the files change their meaning.
-pub const FORMAT: u32 = 5;
+pub const FORMAT: u32 = 6;
 
 /// A policy as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,19 +6,14 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sharp_drive::{FAILURE_COST_S, ProfiledFollower, SpeedProfile, World};
-use sharp_guide::{GuidePath, GuidePlanner, GuideSettings, PlannerKind};
+use sharp_drive::FAILURE_COST_S;
+use sharp_guide::{GuidePlanner, GuideSettings, PlannerKind};
 use sharp_options::AllowedRule;
-use sharp_sim::NoiseModel;
 
 use crate::learn::{OptionLearner, PaperProtocol, PriorOnly, Selection};
 
 /// Prices are not exact: a plan that seems cheaper by less than this factor is not worth trying.
 const RETRY_ABOVE: f64 = 1.1;
-
-/// Time of a learnt policy as a share of the tuned speed profile's: 0.69 for 115 options of the Husky and 0.74 for 79
-/// of the Limo, in the plans of `a` to `d`.
-const PACE: f64 = 0.72;
 
 /// How a problem is solved.
 #[derive(Clone, Debug)]
@@ -53,8 +48,10 @@ pub struct Method {
     pub retry_above: f64,
     /// How a plan that succeeds too rarely is repaired.
     pub repair: RepairSettings,
-    /// Fresh runs through the whole plan that its predicted success is counted on.
+    /// Fresh runs through the whole plan that its predicted success is counted on, at most.
     pub verify_episodes: u32,
+    /// Half the width of the 95 % interval of the predicted success at which counting ends earlier; 0 for never.
+    pub verify_half_width: f64,
 }
 
 /// In which order the options of a plan are learnt.
@@ -76,8 +73,8 @@ pub struct RepairSettings {
     pub episodes: u32,
     /// Success wanted of the whole plan; its options share the failures that are left.
     pub wanted_success: f64,
-    /// Episodes in which one policy for all new options is compared with others.
-    pub screening_episodes: u32,
+    /// Fresh episodes that a weak option's policies are judged by.
+    pub judge_episodes: u32,
 }
 
 /// What an option is taken to cost before anything was measured.
@@ -87,6 +84,8 @@ pub enum PriceRule {
     Length,
     /// The time of a speed profile along its guide: slow in narrow places and before bends.
     Profile,
+    /// Time and chance of failure, as the cost model of the prior says ([`CostModel`](sharp_drive::CostModel)).
+    Model,
 }
 
 /// What the search may assume and must respect.
@@ -96,6 +95,8 @@ pub enum PriceRule {
 pub struct SearchSettings {
     /// What an option is taken to cost before anything was measured.
     pub price: PriceRule,
+    /// Episodes that a price of the model counts as beside measured ones.
+    pub price_episodes: f64,
     /// Speed that turns lengths into seconds before anything was measured, as a share of the top speed.
     pub nominal_speed: f64,
     /// Seconds added to an option without a policy: what training is worth; 0 is the paper's rule.
@@ -120,7 +121,8 @@ pub struct SearchSettings {
 impl Default for SearchSettings {
     fn default() -> Self {
         Self {
-            price: PriceRule::Profile,
+            price: PriceRule::Model,
+            price_episodes: 100.0,
             nominal_speed: 0.5,
             untrained_surcharge_s: 5.0,
             bypass_surcharge_s: 14.0,
@@ -131,22 +133,6 @@ impl Default for SearchSettings {
             smooth_turn_rad: 75.0_f64.to_radians(),
             allowed: AllowedRule::Code,
             guide: GuideSettings::default(),
-        }
-    }
-}
-
-impl SearchSettings {
-    /// What an option with `guide` is taken to cost under `noise` before it is measured, seconds, without surcharges.
-    #[must_use]
-    pub fn price_s(&self, world: &World, noise: &NoiseModel, guide: &GuidePath) -> f64 {
-        self.price_with(&ProfiledFollower::tuned(&world.robot, noise).speed, world, guide)
-    }
-
-    /// The same with the speed profile for the noise.
-    pub(crate) fn price_with(&self, profile: &SpeedProfile, world: &World, guide: &GuidePath) -> f64 {
-        match self.price {
-            PriceRule::Length => guide.length_m() / (self.nominal_speed * world.robot.max_speed_mps),
-            PriceRule::Profile => PACE * profile.time_s(world, guide),
         }
     }
 }
@@ -163,14 +149,14 @@ impl Method {
     /// smoothly, and repairs until the plan succeeds as wanted.
     #[must_use]
     pub fn fast() -> Self {
-        let selection = Selection::default();
-        let screening_episodes = selection.screening_episodes;
+        let prior = Self::prior();
         Self {
             name: "fast".to_owned(),
-            learner: Arc::new(selection),
+            learner: Arc::new(Selection::default()),
             retry_above: RETRY_ABOVE,
-            repair: RepairSettings { rounds: 3, episodes: 1000, wanted_success: 0.99, screening_episodes },
-            ..Self::prior()
+            estimate_episodes: 100,
+            repair: RepairSettings { rounds: 2, episodes: 256, ..prior.repair },
+            ..prior
         }
     }
 
@@ -216,13 +202,9 @@ impl Method {
             join_guides: true,
             usable_success: 0.9,
             retry_above: f64::INFINITY,
-            repair: RepairSettings {
-                rounds: 0,
-                episodes: 1000,
-                wanted_success: 0.99,
-                screening_episodes: 200,
-            },
+            repair: RepairSettings { rounds: 0, episodes: 1000, wanted_success: 0.99, judge_episodes: 500 },
             verify_episodes: 1000,
+            verify_half_width: 0.01,
         }
     }
 
@@ -267,8 +249,8 @@ impl Method {
         Self { name: name.to_owned(), learner, ..self }
     }
 
-    /// The same with fewer or more episodes: `estimate` for each policy, `verify` for the whole plan, `repair` for
-    /// each round of repairs.
+    /// The same with fewer or more episodes: `estimate` for each policy, `verify` at most for the whole plan, `repair`
+    /// for each round of repairs.
     #[must_use]
     pub fn with_episodes(self, estimate: u32, verify: u32, repair: u32) -> Self {
         let repair = RepairSettings { episodes: repair, ..self.repair };

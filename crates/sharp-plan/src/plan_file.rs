@@ -16,6 +16,7 @@ use crate::files::{self, FileError};
 use crate::learn::LearntPolicy;
 use crate::library::{FORMAT, PolicyFile};
 use crate::method::{Method, SearchSettings};
+use crate::price::Pricer;
 use crate::query::Query;
 use crate::verify::{PlannedOption, Solution};
 
@@ -154,6 +155,18 @@ struct StepFile {
 }
 
 impl Plan {
+    /// What each leg of the plan is taken to cost before it is measured, seconds, without surcharges.
+    #[must_use]
+    pub fn prices_s(&self) -> Vec<f64> {
+        let Self { world, noise, method, solution, .. } = self;
+        let pricer = Pricer::new(world, noise, method.search, method.failure_cost_s);
+        let price_s = |(index, step): (usize, &PlannedOption)| {
+            let next = solution.steps.get(index + 1).map(|next| &next.option.guide);
+            pricer.cost_s(&pricer.price(step.option.id, &step.option.guide, next), None)
+        };
+        solution.steps.iter().enumerate().map(price_s).collect()
+    }
+
     /// Writes the plan into `folder`; the abstraction stands beside it as `abstraction`.
     ///
     /// # Errors

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_drive::{ChainRun, Driver, OptionPolicy, SuccessCount};
+use sharp_drive::{ChainRun, Driver, SuccessCount};
 use sharp_guide::GuidedOption;
 use sharp_sim::RobotState;
 
 use crate::files::FileError;
-use crate::learn::{LearningTask, LearntPolicy, initial_states, successive_halving, task};
+use crate::learn::{LearningTask, LearntPolicy, initial_states, task};
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::OptionMonitor;
@@ -40,14 +40,13 @@ pub(crate) fn repair(repair: &Repair<'_>, policies: &mut Policies<'_>) -> Result
         if repair.problem.monitor.should_stop() {
             return Ok(false);
         }
+        eprintln!("DBG repair round {round} {:?} cost {:.2}", of_plan(&runs).count, cost_s(repair, &runs));
         if of_plan(&runs).count.rate() >= settings.wanted_success {
             break;
         }
         let before: Vec<LearntPolicy> =
             repair.plan.iter().map(|option| policies.learnt(option.id).clone()).collect();
-        let changed = round == 0 && try_together(repair, policies, &runs)?
-            || relearn_weak(repair, policies, &runs, u64::from(round))?;
-        if !changed {
+        if !relearn_weak(repair, policies, &runs, u64::from(round))? {
             break;
         }
         let anew = run_plan(repair, policies);
@@ -83,58 +82,6 @@ fn keep(
     policies.keep(alone, learnt, &repair.problem.world.grid)
 }
 
-/// Gives all options that were learnt in this problem one and the same policy if the plan is better off: what
-/// suits each option best may hand over badly to the next. Returns true if it is.
-fn try_together(
-    repair: &Repair<'_>,
-    policies: &mut Policies<'_>,
-    runs: &[ChainRun],
-) -> Result<bool, FileError> {
-    let Repair { problem, plan, .. } = *repair;
-    let new: Vec<usize> = (0..plan.len()).filter(|&index| !policies.is_reused(plan[index].id)).collect();
-    let Some((driven, policy)) = best_for_all(repair, policies, &new) else { return Ok(false) };
-    if cost_s(repair, &driven) >= cost_s(repair, runs) {
-        return Ok(false);
-    }
-    let estimate = |&index: &usize| {
-        let (option, next) = (&plan[index], plan.get(index + 1));
-        let seed = problem.seed.child(&format!("together {}", option.id), 0);
-        let states = initial_states(problem, option, seed).with_arrivals(entries(&driven, index));
-        let task = LearningTask { next, ..task(problem, option, states, seed) };
-        let LearntPolicy { env_steps, gradient_steps, .. } = *policies.learnt(option.id);
-        LearntPolicy { estimate: task.estimate(&policy), policy: policy.clone(), env_steps, gradient_steps }
-    };
-    let learnt: Vec<LearntPolicy> = new.par_iter().map(estimate).collect();
-    for (index, learnt) in new.into_iter().zip(learnt) {
-        problem.monitor.learnt(&plan[index], &learnt);
-        keep(repair, policies, &plan[index], learnt)?;
-    }
-    Ok(true)
-}
-
-/// The cheapest policy for all options of the plan whose numbers are in `new`, with its runs.
-fn best_for_all(
-    repair: &Repair<'_>,
-    policies: &Policies<'_>,
-    new: &[usize],
-) -> Option<(Vec<ChainRun>, OptionPolicy)> {
-    let Repair { problem, plan, .. } = *repair;
-    let drive = |policy: &OptionPolicy, episodes, purpose: &str| {
-        let mut drivers = drivers(plan, policies);
-        for &index in new {
-            drivers[index] = Driver { policy, link: drivers[index].link.clone() };
-        }
-        run_chain(problem, &drivers, episodes, purpose)
-    };
-    let settings = problem.method.repair;
-    let candidates = problem.method.learner.candidates(problem.world, &problem.conditions.noise);
-    let few = successive_halving(candidates, settings.screening_episodes, |policy, episodes, round| {
-        cost_s(repair, &drive(policy, episodes, &format!("screen {round}")))
-    });
-    let driven = few.into_iter().map(|policy| (drive(&policy, settings.episodes, REPAIR), policy));
-    driven.min_by(|a, b| cost_s(repair, &a.0).total_cmp(&cost_s(repair, &b.0)))
-}
-
 /// Learns the weak options again on the states in which they were entered in `runs`. Returns false if no option
 /// became better.
 fn relearn_weak(
@@ -147,12 +94,8 @@ fn relearn_weak(
     // n options that each fail at most a share (1 - wanted) / n make a plan that succeeds as wanted.
     let wanted = 1.0 - (1.0 - repair.problem.method.repair.wanted_success) / plan.len() as f64;
     let on_arrival: Vec<SuccessCount> = (0..plan.len()).map(|index| of_option(runs, index).count).collect();
-    // Those that lose less than the mean option have their turn in the next round.
-    let lost: u32 = on_arrival.iter().map(SuccessCount::failures).sum();
-    let mean_lost = f64::from(lost) / plan.len() as f64;
-    let is_weak = |count: &SuccessCount| {
-        count.episodes >= ENTERED_MIN && count.rate() < wanted && f64::from(count.failures()) >= mean_lost
-    };
+    // A single failure is chance: an option is weak if what is wanted lies above its 95 % interval.
+    let is_weak = |count: &SuccessCount| count.episodes >= ENTERED_MIN && count.upper95() < wanted;
     // An option that arrives badly is as much to blame as the one that cannot cope with it.
     let is_to_blame =
         |index: usize| is_weak(&on_arrival[index]) || on_arrival.get(index + 1).is_some_and(is_weak);
@@ -197,8 +140,13 @@ fn relearn(
     let drivers = drivers(plan, policies);
     let tail = tail(&drivers[index + 1..]);
     let next = plan.get(index + 1);
-    let task =
-        LearningTask { next, tail: &tail, wanted_success: wanted, ..task(problem, option, states, seed) };
+    let task = LearningTask {
+        next,
+        tail: &tail,
+        wanted_success: wanted,
+        estimate_episodes: problem.method.repair.judge_episodes,
+        ..task(problem, option, states, seed)
+    };
     let old = policies.learnt(option.id);
     let SuccessCount { episodes, successes } = task.judge(&old.policy).count;
     let failures_allowed = (1.0 - wanted) * f64::from(episodes);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_drive::{ProfiledFollower, SpeedProfile, World};
+use sharp_drive::{SuccessEstimate, World};
 use sharp_guide::{
     Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption, ridge_routes,
     routes,
@@ -22,6 +22,7 @@ use sharp_space::{Cell, Point, Pose, Seed, trig};
 use crate::abstraction::Abstraction;
 use crate::method::{Method, PriceRule, SearchSettings};
 use crate::option_graph::{Candidate, OptionGraph};
+use crate::price::{Price, Pricer};
 use crate::query::{Monitor, Phase, Query};
 
 /// What a hand-over costs that the robot should not be able to make, where no plan does without one, seconds.
@@ -43,10 +44,9 @@ pub struct Search<'a> {
     goal: Goal,
     graph: OptionGraph,
     guided: BTreeMap<LegId, Result<Arc<GuidedOption>, NoGuide>>,
-    /// How fast a robot of this kind drives under the noise of the problem.
-    profile: SpeedProfile,
-    /// What guided options cost before they are measured, seconds.
-    prices: BTreeMap<LegId, f64>,
+    pricer: Pricer<'a>,
+    /// What guided options cost before they are measured.
+    prices: BTreeMap<LegId, Price>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
@@ -97,7 +97,7 @@ impl<'a> Search<'a> {
             goal: disc,
             graph,
             guided: BTreeMap::new(),
-            profile: ProfiledFollower::tuned(&world.robot, noise).speed,
+            pricer: Pricer::new(world, noise, method.search, method.failure_cost_s),
             prices: BTreeMap::new(),
             offers_direct: false,
             charges: BTreeMap::new(),
@@ -125,10 +125,10 @@ impl<'a> Search<'a> {
         self.charges.insert((before, after), seconds);
     }
 
-    /// The cheapest plan of guided options with its cost in seconds, or `None`. `measured` knows what learnt options cost, seconds.
+    /// The cheapest plan of guided options with its cost in seconds, or `None`. `measured` knows how options did.
     pub fn plan(
         &mut self,
-        measured: &dyn Fn(LegId) -> Option<f64>,
+        measured: &dyn Fn(LegId) -> Option<SuccessEstimate>,
         monitor: &dyn Monitor,
     ) -> Option<(f64, Vec<Arc<GuidedOption>>)> {
         loop {
@@ -149,13 +149,13 @@ impl<'a> Search<'a> {
     /// Notes the guide of the option called `id`, or that it has none.
     fn keep(&mut self, id: LegId, option: Result<Arc<GuidedOption>, NoGuide>) {
         if let Ok(option) = &option {
-            self.prices.insert(id, self.settings.price_with(&self.profile, self.world, &option.guide));
+            self.prices.insert(id, self.pricer.price(id, &option.guide, None));
         }
         self.guided.insert(id, option);
     }
 
     /// The cost and the names of the cheapest plan by what is known now.
-    fn cheapest(&self, measured: &dyn Fn(LegId) -> Option<f64>) -> Option<(f64, Vec<LegId>)> {
+    fn cheapest(&self, measured: &dyn Fn(LegId) -> Option<SuccessEstimate>) -> Option<(f64, Vec<LegId>)> {
         let top_speed = self.world.robot.max_speed_mps;
         let cost = |option: &Candidate| self.cost_s(option, measured(option.id()));
         let charge = |before: &Candidate, after: &Candidate| {
@@ -183,7 +183,7 @@ impl<'a> Search<'a> {
 
     /// What `option` costs, seconds: what was measured, else the price of its guide, else what its straight length
     /// costs at least; infinite where it has no guide.
-    fn cost_s(&self, option: &Candidate, measured: Option<f64>) -> f64 {
+    fn cost_s(&self, option: &Candidate, measured: Option<SuccessEstimate>) -> f64 {
         let settings = &self.settings;
         if !settings.bypasses && matches!(option.id(), LegId::Option(OptionId::Bypass { .. })) {
             return f64::INFINITY;
@@ -196,17 +196,20 @@ impl<'a> Search<'a> {
         let least_s = option.straight_m() / top_mps;
         let unguided_s = match settings.price {
             PriceRule::Length => least_s / settings.nominal_speed,
-            PriceRule::Profile => least_s,
+            PriceRule::Profile | PriceRule::Model => least_s,
         };
-        let price_s = match self.guided.get(&option.id()) {
-            Some(Ok(_)) => self.prices[&option.id()].max(unguided_s),
+        let bypass_s = if option.is_bypass { settings.bypass_surcharge_s } else { 0.0 };
+        let measured = measured.filter(|_| settings.cost_update);
+        let surcharge_s = if measured.is_some() { 0.0 } else { settings.untrained_surcharge_s };
+        let cost_s = match self.guided.get(&option.id()) {
+            Some(Ok(_)) => {
+                let cost_s = self.pricer.cost_s(&self.prices[&option.id()], measured.as_ref());
+                cost_s.max(if measured.is_some() { least_s } else { unguided_s })
+            }
             Some(Err(_)) => return f64::INFINITY,
             None => unguided_s,
         };
-        let estimated = price_s + settings.untrained_surcharge_s;
-        let bypass_s = if option.is_bypass { settings.bypass_surcharge_s } else { 0.0 };
-        let measured = measured.filter(|_| settings.cost_update);
-        measured.map_or(estimated, |seconds| seconds.max(least_s)) + bypass_s
+        cost_s + surcharge_s + bypass_s
     }
 
     /// Seconds lost where one guide ends and the next begins; infinite where the robot should not turn so.
@@ -261,7 +264,8 @@ impl<'a> Search<'a> {
     /// The cheapest of the routes to `end` with different safety margins, by their prices.
     fn direct_route(&self, end: Point) -> Option<GuidePath> {
         let (robot, start) = (self.world.guide_robot(), self.query.start);
-        let price_s = |guide: &GuidePath| self.settings.price_with(&self.profile, self.world, guide);
+        let price_s =
+            |guide: &GuidePath| self.pricer.cost_s(&self.pricer.price(LegId::Direct, guide, None), None);
         let cheapest = ridge_routes(&robot, start, end).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
         cheapest.or_else(|| routes(&robot, start, end, 0.5 * self.goal.radius_m).next())
     }
@@ -303,6 +307,8 @@ fn state_near(states: &dyn StateAbstraction, point: Point) -> Option<StateId> {
 
 #[cfg(test)]
 mod tests {
+    use sharp_drive::SuccessCount;
+
     use super::*;
     use crate::test_worlds::{HALL, RING, SEALED, along, straight, world};
     use sharp_options::OptionKind;
@@ -316,14 +322,14 @@ mod tests {
         (world, abstraction): &(World, Abstraction),
         query: Query,
         settings: SearchSettings,
-        measured: &dyn Fn(LegId) -> Option<f64>,
+        measured: &dyn Fn(LegId) -> Option<SuccessEstimate>,
     ) -> Option<Vec<Arc<GuidedOption>>> {
         let method = Method { search: settings, ..Method::fast() };
         let search = Search::new(world, abstraction, &method, &NoiseModel::nominal(), query, [], Seed(1));
         search.expect("both ends have a state").plan(measured, &()).map(|(_, plan)| plan)
     }
 
-    fn unmeasured(_: LegId) -> Option<f64> {
+    fn unmeasured(_: LegId) -> Option<SuccessEstimate> {
         None
     }
 
@@ -355,7 +361,8 @@ mod tests {
         let settings = SearchSettings::default();
         let first = plan(&world, round(), settings, &unmeasured).expect("two ways lead round");
         let option = first.iter().find(|o| matches!(o.id, LegId::Option(_))).expect("an option").id;
-        let slow = |id| (id == option).then_some(500.0);
+        let count = SuccessCount { episodes: 1000, successes: 1000 };
+        let slow = |id| (id == option).then_some(SuccessEstimate { count, mean_time_s: 500.0 });
         let second = plan(&world, round(), settings, &slow).expect("the other way");
         assert!(second.iter().all(|o| o.id != option), "{} uses the slow {option}", names(&second));
         let settings = SearchSettings { cost_update: false, ..settings };

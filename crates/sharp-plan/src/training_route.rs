@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use rand::RngExt;
 use sharp_drive::{
-    CostModel, DriveRow, Driver, InitialStates, Link, MonteCarlo, OptionPolicy, PolicyContext,
+    CostModel, DriveRow, Driver, GuideEnds, InitialStates, Link, MonteCarlo, OptionPolicy, PolicyContext,
     PolicyInterface, PredictedCost, Prior, Scenario, ScenarioSource, SuccessEstimate, World, drive_rows,
     prior_interface,
 };
@@ -100,7 +100,8 @@ impl TrainingRoute {
     pub fn predict(&self, model: &CostModel, noise: &NoiseModel, caution: f32) -> Vec<PredictedCost> {
         let links = Link::chain(&self.options);
         let of = |(index, link): (usize, &Link)| {
-            model.predict(&self.world, (&link.guide(), index == 0), noise, &[caution]).remove(0)
+            let ends = GuideEnds { from_rest: index == 0, to_goal: link.next.is_none() };
+            model.predict(&self.world, (&link.guide(), ends), noise, &[caution]).remove(0)
         };
         links.iter().enumerate().map(of).collect()
     }

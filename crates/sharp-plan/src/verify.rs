@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use sharp_drive::{ChainRun, Driver, EpisodeEnd, SuccessCount, SuccessEstimate};
+use sharp_drive::{ChainRun, Driver, EpisodeEnd, MonteCarlo, SuccessCount, SuccessEstimate};
 use sharp_guide::{GuidedOption, Role};
 use sharp_sim::RobotState;
 
 use crate::learn::LearntPolicy;
+use crate::method::Method;
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Query;
@@ -68,9 +69,13 @@ pub(crate) fn run_chain(
     episodes: u32,
     purpose: &str,
 ) -> Vec<ChainRun> {
+    trial(problem, episodes, purpose).runs(drivers, RobotState::at_rest(problem.query.start))
+}
+
+/// An experiment of so many `episodes`; `purpose` names the random stream.
+fn trial<'a>(problem: &PlanningProblem<'a>, episodes: u32, purpose: &str) -> MonteCarlo<'a> {
     let trial = problem.conditions.monte_carlo(problem.world);
-    let trial = trial.with_episodes(episodes).with_seed(problem.seed.child(purpose, 0));
-    trial.runs(drivers, RobotState::at_rest(problem.query.start))
+    trial.with_episodes(episodes).with_seed(problem.seed.child(purpose, 0))
 }
 
 /// Counts how often `plan` succeeds.
@@ -79,7 +84,11 @@ pub(crate) fn verify(
     plan: &[Arc<GuidedOption>],
     policies: &Policies<'_>,
 ) -> Solution {
-    let runs = run_chain(problem, &drivers(plan, policies), problem.method.verify_episodes, "verify");
+    let Method { verify_episodes, verify_half_width, .. } = *problem.method;
+    let is_known = |runs: &[ChainRun]| of_plan(runs).count.half_width95() <= verify_half_width;
+    let trial = trial(problem, verify_episodes, "verify");
+    let start = RobotState::at_rest(problem.query.start);
+    let runs = trial.runs_until(&drivers(plan, policies), start, is_known);
     let planned = |(index, option): (usize, &Arc<GuidedOption>)| {
         let arrived = of_option(&runs, index);
         PlannedOption {

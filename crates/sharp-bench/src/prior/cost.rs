@@ -35,8 +35,8 @@ impl CostRecipe {
             map_count: 480,
             drives: 16,
             episodes: 12,
-            hidden: [64, 64],
-            fit: FitSettings { epochs: 6, minibatch: 1024, learning_rate: 2e-3 },
+            hidden: [96, 64],
+            fit: FitSettings { epochs: 14, minibatch: 1024, learning_rate: 2e-3 },
         }
     }
 
@@ -120,7 +120,7 @@ fn drive_once((route, prior): (&TrainingRoute, &Prior), episodes: u32, seed: See
 }
 
 /// How well a cost model predicts, over options that it was not fitted to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CostScore {
     /// Options.
     pub options: usize,
@@ -136,10 +136,9 @@ pub struct CostScore {
     pub predicted_failure: f64,
     /// Correlation of predicted and measured shares of failures.
     pub failure_correlation: f64,
-    /// Among the tenth of the options that are predicted to fail most, the measured share of failures.
-    pub failure_of_riskiest: f64,
-    /// And what is predicted of them.
-    pub predicted_failure_of_riskiest: f64,
+    /// Predicted and measured share of failures of each tenth of the options, those that are predicted to fail most
+    /// first.
+    pub failure_by_tenth: Vec<[f64; 2]>,
 }
 
 /// Compares what `model` says with `episodes` of each option of `routes`.
@@ -172,7 +171,6 @@ pub fn score_cost(
     let mean = |rows: &[[f64; 4]], column: usize| {
         rows.iter().map(|row| row[column]).sum::<f64>() / rows.len() as f64
     };
-    let riskiest = &rows[..rows.len().div_ceil(10)];
     let within = rows.iter().filter(|row| (row[1] / row[0] - 1.0).abs() <= 0.1).count();
     CostScore {
         options: rows.len(),
@@ -182,8 +180,7 @@ pub fn score_cost(
         failure: mean(&rows, 2),
         predicted_failure: mean(&rows, 3),
         failure_correlation: correlation(&rows),
-        failure_of_riskiest: mean(riskiest, 2),
-        predicted_failure_of_riskiest: mean(riskiest, 3),
+        failure_by_tenth: rows.chunks(rows.len().div_ceil(10)).map(|r| [mean(r, 3), mean(r, 2)]).collect(),
     }
 }
 

@@ -274,7 +274,8 @@ fn run_score(args: &PriorScore, seed: u64, json: bool) -> Result<Exit, Failure> 
         let PolicyScore { success, legs_at_99, worst_leg, mean_sim_time_s } = score;
         say!("| {name} | {success:.4} | {legs_at_99:.2} | {worst_leg:.2} | {mean_sim_time_s:.2} |");
     }
-    let CostScore { time_s, predicted_time_s, failure, predicted_failure, failure_correlation, .. } = cost;
+    let CostScore { time_s, predicted_time_s, failure, predicted_failure, failure_correlation, .. } =
+        &report.cost;
     say!(
         "Cost model at full caution: time {predicted_time_s:.2} s for {time_s:.2} s, failures {predicted_failure:.4} \
          for {failure:.4}, correlation {failure_correlation:.2}"

@@ -5,7 +5,7 @@ use sharp_sim::{NoiseModel, Simulator};
 use sharp_space::Seed;
 
 use super::places::{PLACE_LEN, Place};
-use super::{BIN_M, CostModel};
+use super::{BIN_M, CostModel, GuideEnds};
 use crate::automaton::{Automaton, Link};
 use crate::episode::{Controller, Decision, Episode, EpisodeRules, Motion, Supervisor};
 use crate::initial_states::InitialStates;
@@ -13,6 +13,9 @@ use crate::network::PolicyContext;
 use crate::policy::{OptionPolicy, Policy};
 use crate::situation::Observation;
 use crate::world::World;
+
+/// Share of failures at one place beyond which it counts less.
+const HOPELESS: f32 = 0.05;
 
 /// One place under one noise and caution, driven through several times.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,14 +48,17 @@ impl Samples for DriveRows {
         let DriveRow { passes, time_s, failures, .. } = self.0[row];
         let [log_time, log_risk] = [outputs[0], outputs[1]].map(|value| value.clamp(-20.0, 5.0));
         let (taken, expected) = (time_s / libm::expf(log_time), passes * libm::expf(log_risk));
+        // Where next to nobody passes the number does not matter; it must not spread to places that look alike.
+        let weight = (HOPELESS * passes / failures.max(HOPELESS * passes)).min(1.0);
         derivative[0] = passes - taken;
-        derivative[1] = expected - failures;
-        f64::from(taken + passes * log_time) + f64::from(expected - failures * log_risk)
+        derivative[1] = weight * (expected - failures);
+        f64::from(taken + passes * log_time) + f64::from(weight * (expected - failures * log_risk))
     }
 }
 
 /// Drives the chain `links` with `policy` so many times from `states`, and appends what its places showed to `rows`.
-/// `context` is what the policy is told; `from_rest` says that the robot stands where the chain begins.
+/// `context` is what the policy is told; `from_rest` says that the robot stands where the chain begins. Otherwise
+/// nothing is said of the chain's first option.
 pub fn drive_rows(
     (world, simulator, noise): (&World, &dyn Simulator, &NoiseModel),
     (links, policy, context): (&[Link], &OptionPolicy, PolicyContext),
@@ -78,11 +84,14 @@ pub fn drive_rows(
         episode.drive(&mut watch, &Supervisor::silent());
         watch.finish();
     }
-    for (index, (link, tallies)) in links.iter().zip(tallies).enumerate() {
+    // Where a robot was put somewhere at random, its first failures say nothing of the place.
+    let begun = usize::from(!from_rest);
+    for (index, (link, tallies)) in links.iter().zip(tallies).enumerate().skip(begun) {
         let guide = link.guide();
         for (bin, tally) in tallies.into_iter().enumerate().filter(|(_, tally)| tally.passes > 0.0) {
             let mut inputs = [0.0; CostModel::INPUTS];
-            let place = Place { arc_m: bin as f64 * BIN_M, from_rest: from_rest && index == 0 };
+            let ends = GuideEnds { from_rest: from_rest && index == 0, to_goal: link.next.is_none() };
+            let place = Place { arc_m: bin as f64 * BIN_M, ends };
             place.write(world, &guide, &mut inputs[..PLACE_LEN]);
             inputs[PLACE_LEN..].copy_from_slice(&context.entries());
             let Tally { passes, time_s, failures } = tally;

@@ -34,6 +34,15 @@ pub struct CostModel {
     deployed: Arc<DeployedMlp>,
 }
 
+/// What lies before and after a guide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GuideEnds {
+    /// The robot stands at its beginning; otherwise it comes from another guide.
+    pub from_rest: bool,
+    /// It ends at the goal; otherwise another guide follows.
+    pub to_goal: bool,
+}
+
 /// What driving along a guide is predicted to cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PredictedCost {
@@ -109,13 +118,12 @@ impl CostModel {
         if robot.can_turn_in_place() { turning } else { steering }
     }
 
-    /// What `guide` costs under `noise` for each of `cautions`, 0 to 1; `from_rest` where the robot stands at its
-    /// beginning.
+    /// What `guide` costs under `noise` for each of `cautions`, 0 to 1.
     #[must_use]
     pub fn predict(
         &self,
         world: &World,
-        (guide, from_rest): (&GuideView<'_>, bool),
+        (guide, ends): (&GuideView<'_>, GuideEnds),
         noise: &NoiseModel,
         cautions: &[f32],
     ) -> Vec<PredictedCost> {
@@ -128,7 +136,7 @@ impl CostModel {
         for bin in 0..count {
             let arc_m = bin as f64 * BIN_M;
             let share = ((length_m - arc_m) / BIN_M).min(1.0);
-            Place { arc_m, from_rest }.write(world, guide, &mut input[..PLACE_LEN]);
+            Place { arc_m, ends }.write(world, guide, &mut input[..PLACE_LEN]);
             for (context, cost) in contexts.iter().zip(&mut costs) {
                 input[PLACE_LEN..].copy_from_slice(&context.entries());
                 let said = self.deployed.predict(&input, &mut scratch);

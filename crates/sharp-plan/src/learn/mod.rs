@@ -17,14 +17,13 @@ use sharp_drive::{
 };
 use sharp_guide::GuidedOption;
 use sharp_rl::{Progress, TrainError};
-use sharp_sim::{NoiseModel, RobotModel};
+use sharp_sim::RobotModel;
 use sharp_space::Seed;
 
 pub(crate) use options::{initial_states, learn_missing, task};
 pub use paper::PaperProtocol;
 pub use prior_only::PriorOnly;
 pub use selection::Selection;
-pub(crate) use selection::successive_halving;
 
 use crate::conditions::Conditions;
 
@@ -55,11 +54,6 @@ pub trait OptionLearner: Debug + Send + Sync {
         _monitor: &dyn LearningMonitor,
     ) -> Result<Option<LearntPolicy>, LearnFailure> {
         Ok(None)
-    }
-
-    /// Policies that need no learning, for trying one and the same on all new options of a plan.
-    fn candidates(&self, _world: &World, _noise: &NoiseModel) -> Vec<OptionPolicy> {
-        vec![]
     }
 
     /// Success below which [`improve`](Self::improve) wants to train, share of episodes.
@@ -148,7 +142,7 @@ pub struct LearningTask<'a> {
     pub wanted_success: f64,
     /// What a failure costs, seconds.
     pub failure_cost_s: f64,
-    /// Fresh episodes of an estimate.
+    /// Fresh episodes of an estimate, at least.
     pub estimate_episodes: u32,
     /// The root of the task's random streams.
     pub seed: Seed,

@@ -17,9 +17,9 @@ use crate::query::{OptionMonitor, Phase};
 use crate::search::Search;
 
 /// Runs that show how an option arrives.
-const ARRIVALS: usize = 256;
+const ARRIVALS: usize = 64;
 /// Initial states kept of each option.
-const STATE_POOL: usize = 256;
+const STATE_POOL: usize = 128;
 
 /// Learns the policies of `plan` that neither the library nor an earlier attempt has (lines 11, 14 to 16, 19).
 /// Returns false if it was stopped.

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use sharp_drive::{
-    OptionPolicy, PolicyContext, Prior, SuccessCount, SuccessEstimate, World, prior_interface,
+    CostModel, GuideView, OptionPolicy, PolicyContext, Prior, SuccessCount, SuccessEstimate, prior_interface,
 };
 use sharp_guide::ProgressReward;
 use sharp_rl::{Exploration, SacLearner, SacStart, SacState, StopRule, TrainSettings};
-use sharp_sim::NoiseModel;
 
 use super::network::{NetworkTraining, train_network};
 use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner};
+use crate::price::guide_ends;
 
 /// Rounds of successive halving: the share of the screening episodes that each candidate drives, and how many
 /// candidates go on. Those that the last round leaves are compared on all episodes.
@@ -26,8 +26,13 @@ const FINE_CONTACT: f64 = -20.0;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Selection {
+    /// The caution that the cost model takes for best is doubted where it succeeds less often, share of episodes:
+    /// then candidates are compared.
+    pub doubted_below: f64,
     /// Episodes in which candidates are compared.
     pub screening_episodes: u32,
+    /// Fresh episodes that the best of them are judged by.
+    pub judge_episodes: u32,
     /// The prior is trained on where nothing else succeeds as often as this, share of episodes; 0 for never.
     pub train_below: f64,
     /// Budget and hyperparameters of training.
@@ -39,7 +44,9 @@ pub struct Selection {
 impl Default for Selection {
     fn default() -> Self {
         Self {
-            screening_episodes: 200,
+            doubted_below: 0.975,
+            screening_episodes: 100,
+            judge_episodes: 500,
             train_below: 0.97,
             // Few steps: the prior drives already, and what it has not learnt then it hardly will.
             train: TrainSettings::fast().with(|train| {
@@ -63,8 +70,16 @@ impl OptionLearner for Selection {
         task: &LearningTask<'_>,
         monitor: &dyn LearningMonitor,
     ) -> Result<LearntPolicy, LearnFailure> {
-        let chosen = self.choose(task, None, monitor)?.expect("there are candidates");
-        let (estimate, policy) = chosen;
+        if monitor.should_stop() {
+            return Err(LearnFailure::Stopped);
+        }
+        let policy = predicted_best(task);
+        let estimate = task.estimate(&policy);
+        if estimate.count.rate() >= self.doubted_below {
+            return Ok(LearntPolicy::untrained(policy, estimate));
+        }
+        let task = &LearningTask { estimate_episodes: self.judge_episodes, ..task.clone() };
+        let (estimate, policy) = self.choose(task, None, monitor)?.expect("there are candidates");
         let alone = task.estimate_alone(&policy, estimate);
         Ok(LearntPolicy::untrained(policy, alone))
     }
@@ -95,19 +110,13 @@ impl OptionLearner for Selection {
         }))
     }
 
-    fn candidates(&self, world: &World, noise: &NoiseModel) -> Vec<OptionPolicy> {
-        // One slow follower for a whole plan would buy a little success with much time.
-        Prior::shipped(&world.robot).candidates(&world.robot, noise)
-    }
-
     fn train_below(&self) -> f64 {
         self.train_below
     }
 }
 
 impl Selection {
-    /// The prior at the caution that costs least; where it succeeds less often than wanted, a follower if that costs
-    /// less. `None` if nothing succeeds more often than `beaten`.
+    /// The cheapest of the prior at full caution and the fallbacks; `None` if nothing succeeds more often than `beaten`.
     fn choose(
         &self,
         task: &LearningTask<'_>,
@@ -117,27 +126,23 @@ impl Selection {
         let (robot, noise) = (&task.world.robot, &task.conditions.noise);
         let episodes = task.estimate_episodes;
         let allowed = (f64::from(episodes) * (1.0 - task.wanted_success)).floor() as u32;
+        let mut candidates = vec![Prior::shipped(robot).policy(robot, noise)];
+        candidates.extend(OptionPolicy::fallbacks(robot));
         let mut best: Option<(SuccessEstimate, OptionPolicy)> = None;
-        for group in [Prior::shipped(robot).candidates(robot, noise), OptionPolicy::fallbacks(robot)] {
-            for policy in self.cheapest(task, group) {
-                if monitor.should_stop() {
-                    return Err(LearnFailure::Stopped);
-                }
-                let useful = beaten.map_or(episodes, |beaten| beaten.failures().saturating_sub(1));
-                let judged = task.judge_while(&policy, useful.max(allowed));
-                if judged.count.episodes < episodes {
-                    continue;
-                }
-                let succeeds = judged.count.failures() <= allowed;
-                let is_useful = beaten.is_none_or(|beaten| judged.count.successes > beaten.successes);
-                let cost_s = |judged: &SuccessEstimate| judged.cost_s(task.failure_cost_s);
-                let is_cheapest = best.as_ref().is_none_or(|best| cost_s(&judged) < cost_s(&best.0));
-                if (succeeds || is_useful) && is_cheapest {
-                    best = Some((judged, policy));
-                }
-                if succeeds {
-                    return Ok(best);
-                }
+        for policy in self.cheapest(task, candidates) {
+            if monitor.should_stop() {
+                return Err(LearnFailure::Stopped);
+            }
+            let useful = beaten.map_or(episodes, |beaten| beaten.failures().saturating_sub(1));
+            let judged = task.judge_while(&policy, useful.max(allowed));
+            if judged.count.episodes < episodes {
+                continue;
+            }
+            let is_useful = beaten.is_none_or(|beaten| judged.count.successes > beaten.successes);
+            let is_good = is_useful || judged.count.failures() <= allowed;
+            let cost_s = |judged: &SuccessEstimate| judged.cost_s(task.failure_cost_s);
+            if is_good && best.as_ref().is_none_or(|best| cost_s(&judged) < cost_s(&best.0)) {
+                best = Some((judged, policy));
             }
         }
         Ok(best)
@@ -173,9 +178,23 @@ impl Selection {
     }
 }
 
+/// The prior at the caution that costs least, as its model says.
+fn predicted_best(task: &LearningTask<'_>) -> OptionPolicy {
+    let LearningTask { world, conditions, option, next, failure_cost_s, .. } = task;
+    let guide = GuideView { current: &option.guide, next: next.map(|next| &next.guide) };
+    let cautions = Prior::CAUTIONS;
+    let model = CostModel::shipped(&world.robot);
+    let costs = model.predict(world, (&guide, guide_ends(option.id)), &conditions.noise, &cautions);
+    let priced = cautions.into_iter().zip(costs);
+    let (caution, _) = priced
+        .min_by(|a, b| a.1.cost_s(*failure_cost_s).total_cmp(&b.1.cost_s(*failure_cost_s)))
+        .expect("there are cautions");
+    Prior::shipped(&world.robot).at(caution, &world.robot, &conditions.noise)
+}
+
 /// Successive halving (Jamieson and Talwalkar 2016): each round compares fewer candidates on more episodes.
 /// `cost_s(policy, episodes, round)` drives a policy. The cheapest comes first.
-pub(crate) fn successive_halving(
+fn successive_halving(
     mut candidates: Vec<OptionPolicy>,
     episodes: u32,
     cost_s: impl Fn(&OptionPolicy, u32, u64) -> f64 + Sync,
@@ -194,6 +213,7 @@ pub(crate) fn successive_halving(
 mod tests {
     use sharp_drive::InitialStates;
     use sharp_options::OptionKind;
+    use sharp_sim::NoiseModel;
     use sharp_sim::RobotState;
     use sharp_space::Seed;
 
@@ -222,7 +242,7 @@ mod tests {
         };
         let learnt = method.learner.learn(&task, &|| false).expect("a sound task");
         assert_eq!((learnt.env_steps, learnt.gradient_steps), (0, 0), "trained in an open hall");
-        assert_eq!(learnt.estimate.count.episodes, 1000, "estimated on fresh episodes");
+        assert_eq!(learnt.estimate.count.episodes, 100, "estimated on fresh episodes");
         assert!(learnt.estimate.count.rate() >= 0.99, "only {:?}", learnt.estimate);
         let stopped = method.learner.learn(&task, &|| true);
         assert!(matches!(stopped, Err(LearnFailure::Stopped)), "a stop is heard");
