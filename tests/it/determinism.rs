@@ -45,7 +45,7 @@ fn quick_fast() -> Method {
     selection.screening_episodes = 50;
     let mut method = Method::fast().with_episodes(200, 100, 100);
     method.learner = Arc::new(selection);
-    (method.repair.rounds, method.repair.screening_episodes) = (1, 50);
+    (method.repair.rounds, method.repair.judge_episodes) = (1, 50);
     method
 }
 

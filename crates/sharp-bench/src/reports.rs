@@ -114,6 +114,10 @@ impl OptionReport {
 /// What a plan says of itself.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Predicted {
+    /// What it was counted on: `runs` of the whole plan.
+    pub basis: &'static str,
+    /// How many.
+    pub episodes: u32,
     /// Probability of success.
     pub success: f64,
     /// The lower end of its two-sided 95 % interval.
@@ -182,6 +186,8 @@ impl SolveReport {
             plan: steps.map(report).collect(),
             reuse: Reuse { uses, reused },
             predicted: Some(Predicted {
+                basis: "runs",
+                episodes: solution.predicted.episodes,
                 success: solution.predicted.rate(),
                 lower95: solution.predicted.lower95(),
                 sim_time_s: solution.predicted_time_s,

@@ -2,6 +2,7 @@
 //!
 //! Keys are a contract: once written, a key keeps its meaning, and lines of before stay readable.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -68,6 +69,9 @@ pub struct ResultLine {
     pub calibration: Option<SuccessCount>,
     /// How many of the plan's options had been learnt before.
     pub reuse: Reuse,
+    /// Legs of the plan by the kind of their policy.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub policies: BTreeMap<String, usize>,
     /// Steps of the environment that learning took.
     pub env_steps: u64,
     /// Gradient steps that learning took.
@@ -250,6 +254,7 @@ impl ResultLine {
             machine: Machine::default(),
             job: format!("{env}-{robot}-{kind}"),
             reuse: Reuse { uses: 4, reused: 1 },
+            policies: [("learnt", 5), ("profiled", 1)].map(|(kind, uses)| (kind.to_owned(), uses)).into(),
             env_steps: 0,
             gradient_steps: 0,
             time_s: SolveTimes { regions: 0.5, learn: 3.0, verify: 1.0, total: 5.0, ..SolveTimes::default() },

@@ -195,6 +195,10 @@ pub(crate) struct Solve {
     /// Where the plan is written [default: a fresh folder under ./sharp-plans].
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Runs of the whole plan that its predicted success is counted on; auto stops as soon as the 95 % interval is two
+    /// points wide, at the latest after 1000.
+    #[arg(long, default_value = "auto", value_name = "N|auto")]
+    pub(crate) verify: String,
     /// Stop after so many seconds of wall time; what was learnt is kept.
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,

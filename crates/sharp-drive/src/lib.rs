@@ -58,7 +58,7 @@ mod test_worlds;
 pub use automaton::{Automaton, Link, Visit};
 pub use chain::{ChainRun, Driver};
 pub use command::Command;
-pub use cost::{CostModel, DriveRow, DriveRows, GuideEnds, PredictedCost, drive_rows};
+pub use cost::{CostModel, DriveRow, GuideEnds, PredictedCost, RiskSamples, TimeSamples, drive_rows};
 pub use count::SuccessCount;
 pub use episode::{
     Controller, Decision, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Motion, Readiness, Supervisor,

@@ -11,12 +11,16 @@ use std::sync::{Arc, LazyLock};
 use sharp_rl::{Actor, DeployedActor, StoreError};
 use sharp_sim::{NoiseModel, RobotModel};
 
+use crate::estimate::FAILURE_COST_S;
 use crate::follower::{Follower, SteeringRule};
 use crate::network::{Correction, NetworkPolicy, PolicyContext, PolicyInterface};
 use crate::policy::OptionPolicy;
 
-/// The degree of caution of a prior that is taken without a choice: at the usual price of a failure it costs least.
-const CAUTION: f32 = 1.0;
+/// Degrees of caution that are compared when a prior is scored, the least first.
+const CAUTIONS: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// Prices of a failure at which no and full caution are right, seconds. The priors are trained with prices from 30 s to
+/// 2,000 s; in plans full caution is the cheapest from 1,000 s on (`docs/algorithms/prior.md`).
+const FAILURE_COSTS_S: [f64; 2] = [30.0, FAILURE_COST_S];
 
 /// The note in a prior's file that says what its inputs mean, and the only value that is read.
 const FORMAT_NOTE: (&str, &str) = ("prior-format", "2");
@@ -30,9 +34,6 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// Degrees of caution at which the prior is offered, the least first.
-    pub const CAUTIONS: [f32; 5] = [0.0, 0.25, 0.5, 0.75, CAUTION];
-
     /// The prior that `actor` was trained to be.
     ///
     /// # Errors
@@ -83,13 +84,22 @@ impl Prior {
     /// Its policies for `robot` under `noise`, the least cautious first.
     #[must_use]
     pub fn candidates(&self, robot: &RobotModel, noise: &NoiseModel) -> Vec<OptionPolicy> {
-        Self::CAUTIONS.into_iter().map(|caution| self.at(caution, robot, noise)).collect()
+        CAUTIONS.into_iter().map(|caution| self.at(caution, robot, noise)).collect()
+    }
+
+    /// How careful it is to be where a failure costs `failure_cost_s`, 0 to 1; in training each step of caution
+    /// multiplies the price by the same factor.
+    #[must_use]
+    pub fn caution(failure_cost_s: f64) -> f32 {
+        let [least_s, most_s] = FAILURE_COSTS_S;
+        let factor = failure_cost_s.max(least_s) / least_s;
+        (libm::log(factor) / libm::log(most_s / least_s)).min(1.0) as f32
     }
 
     /// Its policy for `robot` under `noise` at full caution.
     #[must_use]
     pub fn policy(&self, robot: &RobotModel, noise: &NoiseModel) -> OptionPolicy {
-        self.at(CAUTION, robot, noise)
+        self.at(1.0, robot, noise)
     }
 
     /// Its policy for `robot` under `noise` at this degree of `caution`, 0 to 1.
@@ -136,10 +146,17 @@ mod tests {
     fn every_shipped_prior_can_be_read_and_written() {
         for robot in [RobotModel::husky(), RobotModel::limo()] {
             let prior = Prior::shipped(&robot);
-            assert_eq!(prior.candidates(&robot, &NoiseModel::nominal()).len(), Prior::CAUTIONS.len());
+            assert_eq!(prior.candidates(&robot, &NoiseModel::nominal()).len(), CAUTIONS.len());
             let again = Prior::from_bytes(&prior.to_bytes()).expect("own bytes");
             assert_eq!(&again, prior, "written and read");
         }
+    }
+
+    #[test]
+    fn caution_follows_the_price_of_a_failure() {
+        let cautions = [0.0, 30.0, 173.0, 1000.0, 1e6].map(Prior::caution);
+        assert!((cautions[2] - 0.5).abs() < 0.01, "{cautions:?}");
+        assert_eq!([cautions[0], cautions[1], cautions[3], cautions[4]], [0.0, 0.0, 1.0, 1.0]);
     }
 
     #[test]

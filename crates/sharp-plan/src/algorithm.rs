@@ -97,13 +97,6 @@ fn algorithm_1(
         }
         let solution = verify(problem, &p, &policies);
         verified += 1;
-        eprintln!(
-            "DBG plan {:?} cost {:.2} {:?} time {:.1}",
-            names(&p).iter().map(|n| n.to_string()).collect::<Vec<_>>(),
-            solution.estimate().cost_s(method.failure_cost_s),
-            solution.predicted,
-            solution.predicted_time_s
-        );
         search.offer_direct();
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
         let cost_s = |solution: &Solution| solution.estimate().cost_s(method.failure_cost_s);
@@ -111,12 +104,6 @@ fn algorithm_1(
             best = Some(solution);
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
-        eprintln!(
-            "DBG verified {} best {best_s:.2} other {:.2} retry {}",
-            names(&p).len(),
-            other_s(&mut search, &policies),
-            method.retry_above
-        );
         if verified == VERIFIED_MAX || best_s <= method.retry_above * other_s(&mut search, &policies) {
             break;
         }

@@ -1,8 +1,7 @@
 //! What an option costs: before it was driven, and with what was measured since.
 
 use sharp_drive::{
-    CostModel, GuideEnds, GuideView, PredictedCost, Prior, ProfiledFollower, SpeedProfile, SuccessEstimate,
-    World,
+    CostModel, GuideEnds, GuideView, Prior, ProfiledFollower, SpeedProfile, SuccessEstimate, World,
 };
 use sharp_guide::{GuidePath, LegId, Role};
 use sharp_sim::NoiseModel;
@@ -61,11 +60,9 @@ impl<'a> Pricer<'a> {
     fn of_model(&self, id: LegId, guide: GuideView<'_>) -> Price {
         let ends = guide_ends(id);
         let model = CostModel::shipped(&self.world.robot);
-        let costs = model.predict(self.world, (&guide, ends), &self.noise, &Prior::CAUTIONS);
-        let cost_s = |cost: &PredictedCost| cost.cost_s(self.failure_cost_s);
-        let least = costs.into_iter().min_by(|a, b| cost_s(a).total_cmp(&cost_s(b)));
-        let least = least.expect("there are cautions");
-        Price { time_s: least.time_s, success: least.success() }
+        let caution = Prior::caution(self.failure_cost_s);
+        let cost = model.predict(self.world, (&guide, ends), &self.noise, caution);
+        Price { time_s: cost.time_s, success: cost.success() }
     }
 
     /// The cost of a leg in seconds where `measured` is known of it beside its `price`.
@@ -95,4 +92,55 @@ impl<'a> Pricer<'a> {
 /// Where the leg called `id` begins and ends.
 pub(crate) fn guide_ends(id: LegId) -> GuideEnds {
     GuideEnds { from_rest: id.role() == Role::First, to_goal: matches!(id, LegId::Direct | LegId::Last(..)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_drive::SuccessCount;
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::method::Method;
+    use crate::test_worlds::{HALL, along, options, world};
+
+    fn cost_s(rule: PriceRule, measured: Option<SuccessEstimate>) -> f64 {
+        let (world, _) = world(HALL, OptionKind::Centroid);
+        let settings = SearchSettings { price: rule, ..SearchSettings::default() };
+        let pricer = Pricer::new(&world, &NoiseModel::nominal(), settings, Method::fast().failure_cost_s);
+        pricer.cost_s(&Price { time_s: 10.0, success: 0.99 }, measured.as_ref())
+    }
+
+    fn measured(episodes: u32, successes: u32) -> Option<SuccessEstimate> {
+        Some(SuccessEstimate { count: SuccessCount { episodes, successes }, mean_time_s: 8.0 })
+    }
+
+    #[test]
+    fn a_price_of_the_model_outweighs_few_episodes_and_not_many() {
+        let costs =
+            [None, measured(100, 100), measured(100_000, 100_000)].map(|m| cost_s(PriceRule::Model, m));
+        assert!((costs[0] - 20.1).abs() < 0.1, "{costs:?}");
+        assert!((costs[1] - 13.0).abs() < 0.1, "half of the failures: {costs:?}");
+        assert!((costs[2] - 8.0).abs() < 0.1, "what was measured: {costs:?}");
+        let failed = SuccessEstimate { mean_time_s: f64::INFINITY, ..measured(100, 0).expect("some") };
+        assert!((500.0..600.0).contains(&cost_s(PriceRule::Model, Some(failed))), "half of them fail");
+    }
+
+    #[test]
+    fn the_other_rules_take_what_was_measured() {
+        assert_eq!(cost_s(PriceRule::Length, measured(10, 10)), 8.0);
+        assert_eq!(cost_s(PriceRule::Profile, measured(10, 5)), 16.0 + 500.0);
+    }
+
+    #[test]
+    fn every_rule_prices_a_guide() {
+        let (world, abstraction) = world(HALL, OptionKind::Centroid);
+        let option = &options(&world, &abstraction, along())[1];
+        for rule in [PriceRule::Length, PriceRule::Profile, PriceRule::Model] {
+            let settings = SearchSettings { price: rule, ..SearchSettings::default() };
+            let pricer = Pricer::new(&world, &NoiseModel::nominal(), settings, 1000.0);
+            let cost_s = pricer.cost_s(&pricer.price(option.id, &option.guide, None), None);
+            let at_top_s = option.guide.length_m() / world.robot.max_speed_mps;
+            assert!((at_top_s..6.0 * at_top_s + 10.0).contains(&cost_s), "{rule:?}: {cost_s} s");
+        }
+    }
 }

@@ -40,7 +40,6 @@ pub(crate) fn repair(repair: &Repair<'_>, policies: &mut Policies<'_>) -> Result
         if repair.problem.monitor.should_stop() {
             return Ok(false);
         }
-        eprintln!("DBG repair round {round} {:?} cost {:.2}", of_plan(&runs).count, cost_s(repair, &runs));
         if of_plan(&runs).count.rate() >= settings.wanted_success {
             break;
         }

@@ -101,7 +101,7 @@ impl TrainingRoute {
         let links = Link::chain(&self.options);
         let of = |(index, link): (usize, &Link)| {
             let ends = GuideEnds { from_rest: index == 0, to_goal: link.next.is_none() };
-            model.predict(&self.world, (&link.guide(), ends), noise, &[caution]).remove(0)
+            model.predict(&self.world, (&link.guide(), ends), noise, caution)
         };
         links.iter().enumerate().map(of).collect()
     }

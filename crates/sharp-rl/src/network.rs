@@ -83,6 +83,33 @@ impl Mlp {
         Ok(Self { sizes: sizes.to_vec(), parameters })
     }
 
+    /// The network that computes what `self` and `other` compute, side by side: its outputs are those of `self`, then
+    /// those of `other`. `None` if they have not the same inputs or not as many layers.
+    #[must_use]
+    pub fn beside(&self, other: &Self) -> Option<Self> {
+        if self.sizes[0] != other.sizes[0] || self.layer_count() != other.layer_count() {
+            return None;
+        }
+        let mut sizes: Vec<usize> = self.sizes.iter().zip(&other.sizes).map(|(a, b)| a + b).collect();
+        sizes[0] = self.sizes[0];
+        let mut parameters = Vec::with_capacity(parameter_count(&sizes));
+        for index in 0..self.layer_count() {
+            let both = [(self, 0), (other, self.sizes[index])];
+            for (network, place) in both {
+                let inputs = network.sizes[index];
+                // The first layer of both reads the same inputs.
+                let before = if index == 0 { 0 } else { place };
+                for row in network.layer(index).weights.chunks_exact(inputs) {
+                    parameters.extend(std::iter::repeat_n(0.0, before));
+                    parameters.extend_from_slice(row);
+                    parameters.extend(std::iter::repeat_n(0.0, sizes[index] - before - inputs));
+                }
+            }
+            both.iter().for_each(|(network, _)| parameters.extend_from_slice(network.layer(index).bias));
+        }
+        Some(Self { sizes, parameters })
+    }
+
     /// Replaces all parameters, in the order of [`Self::parameters`].
     ///
     /// # Errors
@@ -456,6 +483,23 @@ mod tests {
                 assert!((single - batch).abs() < 1e-5, "row {row}: {single} alone, {batch} in the batch");
             }
         }
+    }
+
+    #[test]
+    fn two_networks_side_by_side_compute_what_each_does() {
+        let rng = &mut Stream::seed_from_u64(8);
+        let (first, second) = (Mlp::new(&[3, 5, 4, 1], rng), Mlp::new(&[3, 2, 7, 2], rng));
+        let both = first.beside(&second).expect("as many layers");
+        assert_eq!(both.sizes(), [3, 7, 11, 3]);
+        let mut scratch = Scratch::default();
+        for input in [[0.3, -0.2, 0.9], [-1.0, 0.5, 0.0]] {
+            let mut expected = first.predict(&input, &mut scratch).to_vec();
+            expected.extend_from_slice(second.predict(&input, &mut scratch));
+            for (found, expected) in both.predict(&input, &mut scratch).iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-6, "{found}, expected {expected}");
+            }
+        }
+        assert!(first.beside(&Mlp::new(&[2, 5, 4, 1], rng)).is_none(), "other inputs");
     }
 
     #[test]

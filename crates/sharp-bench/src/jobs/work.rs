@@ -1,5 +1,6 @@
 //! Doing a job: its problems in order, each a transaction.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -214,6 +215,7 @@ impl JobTask<'_> {
             predicted_success: 0.0,
             calibration: None,
             reuse: Reuse { uses: 0, reused: 0 },
+            policies: BTreeMap::new(),
             env_steps: 0,
             gradient_steps: 0,
             decision_us: DecisionTimes::default(),
@@ -254,6 +256,10 @@ fn with_solution(line: ResultLine, report: &SolveReport) -> ResultLine {
         status: report.status.to_owned(),
         predicted_success: report.predicted.as_ref().map_or(0.0, |predicted| predicted.success),
         reuse: report.reuse,
+        policies: report.plan.iter().fold(BTreeMap::new(), |mut uses, option| {
+            *uses.entry(option.policy.to_owned()).or_default() += 1;
+            uses
+        }),
         env_steps: learnt().map(|option| option.env_steps).sum(),
         gradient_steps: learnt().map(|option| option.gradient_steps).sum(),
         time_s: report.time_s,

@@ -3,28 +3,37 @@
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
-use sharp_drive::{CostModel, DriveRow, DriveRows, Prior, SuccessEstimate};
+use sharp_drive::{CostModel, DriveRow, Prior, RiskSamples, SuccessEstimate, TimeSamples};
 use sharp_plan::TrainingRoute;
-use sharp_rl::{FitError, FitSettings, Mlp, StoreError, fit};
+use sharp_rl::{FitError, FitSettings, Mlp, Scratch, StoreError, fit};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::Seed;
 use thiserror::Error;
 
 use super::courses::PriorCourses;
 
+/// Places with a higher risk are left out of the calibration, failures a pass: few of them outweigh all others.
+const CALIBRATED_RISK: f32 = 0.01;
+/// Times that each held-out route is driven for the calibration.
+const CALIBRATION_DRIVES: u64 = 6;
+
 /// How a cost model is fitted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CostRecipe {
-    /// Generated maps.
+    /// Generated maps to fit to.
     pub map_count: u32,
+    /// Generated maps of held-out kinds that the risk is calibrated on.
+    pub calibration_maps: u32,
     /// Times that each route is driven, each time under another noise and at another caution.
     pub drives: u64,
     /// Episodes of such a drive.
     pub episodes: u32,
-    /// Widths of the hidden layers.
+    /// Widths of the hidden layers, of the network of times and of that of risks.
     pub hidden: [usize; 2],
-    /// How the network is fitted.
-    pub fit: FitSettings,
+    /// How the network of times is fitted.
+    pub time_fit: FitSettings,
+    /// How the network of risks is fitted.
+    pub risk_fit: FitSettings,
 }
 
 impl CostRecipe {
@@ -33,10 +42,12 @@ impl CostRecipe {
     pub const fn shipped() -> Self {
         Self {
             map_count: 480,
+            calibration_maps: 120,
             drives: 16,
             episodes: 12,
-            hidden: [96, 64],
-            fit: FitSettings { epochs: 14, minibatch: 1024, learning_rate: 2e-3 },
+            hidden: [64, 64],
+            time_fit: FitSettings { epochs: 4, minibatch: 1024, learning_rate: 2e-3 },
+            risk_fit: FitSettings { epochs: 16, minibatch: 1024, learning_rate: 2e-3 },
         }
     }
 
@@ -45,10 +56,12 @@ impl CostRecipe {
     pub const fn tiny() -> Self {
         Self {
             map_count: 24,
+            calibration_maps: 8,
             drives: 6,
             episodes: 8,
             hidden: [32, 32],
-            fit: FitSettings { epochs: 8, minibatch: 256, learning_rate: 3e-3 },
+            time_fit: FitSettings { epochs: 8, minibatch: 256, learning_rate: 3e-3 },
+            risk_fit: FitSettings { epochs: 8, minibatch: 256, learning_rate: 3e-3 },
         }
     }
 }
@@ -74,8 +87,10 @@ pub struct FittedCost {
     pub rows: usize,
     /// Failures among them.
     pub failures: f64,
-    /// The mean loss of each epoch.
+    /// The mean loss of each epoch of the risks.
     pub losses: Vec<f64>,
+    /// What the risk was multiplied by after the fit, so that it is right for kinds of map that were not fitted to.
+    pub risk_factor: f64,
 }
 
 /// Fits the cost model of `prior` for `robot`. Equal recipes and seeds give equal bytes on one kind of processor.
@@ -89,22 +104,65 @@ pub fn fit_cost(
 ) -> Result<FittedCost, CostError> {
     let seed = seed.child("cost", 0);
     let routes = PriorCourses::training(robot, seed).routes(recipe.map_count, on_map);
+    let rows = drive_all((&routes, prior), (recipe.drives, recipe.episodes), seed);
+    let rng = &mut seed.stream("fit", 0);
+    let [first, second] = recipe.hidden;
+    // Each on its own: failures are rare, and what is common would drown them.
+    let mut time = Mlp::new(&[CostModel::INPUTS, first, second, 1], rng);
+    fit(&mut time, &TimeSamples(&rows), &recipe.time_fit, rng)?;
+    let mut risk = Mlp::new(&[CostModel::INPUTS, first, second, 1], rng);
+    let losses = fit(&mut risk, &RiskSamples(&rows), &recipe.risk_fit, rng)?;
+    let mut network = time.beside(&risk).expect("both have the same inputs and as many layers");
+    let failures = rows.iter().map(|row| f64::from(row.failures)).sum();
+    let risk_factor = calibrate(&mut network, (robot, prior, recipe, seed.child("calibration", 0)), on_map);
+    Ok(FittedCost { model: CostModel::new(network)?, rows: rows.len(), failures, losses, risk_factor })
+}
+
+/// Multiplies the risk that `network` says by a factor, so that it is right in sum on kinds of map that it was not
+/// fitted to; returns the factor.
+fn calibrate(
+    network: &mut Mlp,
+    (robot, prior, recipe, seed): (&RobotModel, &Prior, &CostRecipe, Seed),
+    on_map: &(dyn Fn() + Sync),
+) -> f64 {
+    let routes = PriorCourses::held_out(robot, seed).routes(recipe.calibration_maps, on_map);
+    let rows = drive_all((&routes, prior), (CALIBRATION_DRIVES, recipe.episodes), seed);
+    let (mut scratch, mut predicted, mut failures) = (Scratch::default(), 0.0, 0.0);
+    for row in &rows {
+        let log_risk = network.predict(&row.inputs, &mut scratch)[1];
+        let risk = libm::expf(log_risk);
+        if risk < CALIBRATED_RISK {
+            predicted += f64::from(row.passes * risk);
+            failures += f64::from(row.failures);
+        }
+    }
+    if predicted == 0.0 || failures == 0.0 {
+        return 1.0;
+    }
+    let factor: f64 = failures / predicted;
+    // The last bias is that of the logarithm of the risk.
+    if let Some(bias) = network.parameters_mut().last_mut() {
+        *bias += libm::log(factor) as f32;
+    }
+    factor
+}
+
+/// Drives each of `routes` so many times under drawn noises, so many episodes each.
+fn drive_all(
+    (routes, prior): (&[TrainingRoute], &Prior),
+    (drives, episodes): (u64, u32),
+    seed: Seed,
+) -> Vec<DriveRow> {
     let drive = |(index, route): (usize, &TrainingRoute)| {
         let mut rows = Vec::new();
-        for number in 0..recipe.drives {
+        for number in 0..drives {
             let seed = seed.child("route", index as u64).child("drive", number);
-            drive_once((route, prior), recipe.episodes, seed, &mut rows);
+            drive_once((route, prior), episodes, seed, &mut rows);
         }
         rows
     };
     let rows: Vec<Vec<DriveRow>> = routes.par_iter().enumerate().map(drive).collect();
-    let rows = DriveRows(rows.into_iter().flatten().collect());
-    let rng = &mut seed.stream("fit", 0);
-    let [first, second] = recipe.hidden;
-    let mut network = Mlp::new(&[CostModel::INPUTS, first, second, CostModel::OUTPUTS], rng);
-    let losses = fit(&mut network, &rows, &recipe.fit, rng)?;
-    let failures = rows.0.iter().map(|row| f64::from(row.failures)).sum();
-    Ok(FittedCost { model: CostModel::new(network)?, rows: rows.0.len(), failures, losses })
+    rows.into_iter().flatten().collect()
 }
 
 /// Drives `route` under a noise, at a caution and from an option that `seed` draws.
@@ -192,4 +250,24 @@ fn correlation(rows: &[[f64; 4]]) -> f64 {
     let sum = |f: fn(f64, f64) -> f64| rows.iter().map(|row| f(row[2] - x, row[3] - y)).sum::<f64>();
     let (xy, xx, yy) = (sum(|a, b| a * b), sum(|a, _| a * a), sum(|_, b| b * b));
     if xx * yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_fit_knows_times_and_equal_seeds_give_equal_bytes() {
+        let robot = RobotModel::husky();
+        let prior = Prior::shipped(&robot);
+        let recipe = CostRecipe { map_count: 8, drives: 3, episodes: 4, ..CostRecipe::tiny() };
+        let fitted = || fit_cost((&robot, prior, &recipe, Seed(1)), &|| ()).expect("there are routes");
+        let (first, second) = (fitted(), fitted());
+        assert_eq!(first.model.to_bytes(), second.model.to_bytes(), "equal seeds");
+        assert!(first.rows > 1000 && first.losses.is_sorted_by(|a, b| a >= b), "{:?}", first.losses);
+        let routes = PriorCourses::held_out(&robot, Seed(1)).routes(4, &|| ());
+        let noise = NoiseModel::nominal();
+        let score = score_cost((&first.model, prior), (&routes, &robot), (&noise, 1.0), (20, Seed(2)));
+        assert!((score.predicted_time_s / score.time_s - 1.0).abs() < 0.3, "{score:?}");
+    }
 }

@@ -11,6 +11,9 @@ use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{SolveMonitor, is_interrupted, spinner};
 
+/// Runs that `--verify` may ask for.
+const EPISODES_MAX: u32 = 1_000_000;
+
 pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> {
     let stopwatch = Stopwatch::start("load");
     let time_limit = args.time_limit.map(limit).transpose()?;
@@ -23,7 +26,7 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     let problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
     let settings = SolveSettings {
         abstraction: args.abstraction.request(),
-        method: method(args),
+        method: method(args)?,
         simulator: input::simulator(&args.simulator)?,
         seed,
     };
@@ -60,11 +63,20 @@ fn limit(seconds: f64) -> Result<Duration, Failure> {
 }
 
 /// How the flags want the problem solved.
-fn method(args: &Solve) -> Method {
+fn method(args: &Solve) -> Result<Method, Failure> {
     let mut method = Method::by_name(args.learning.name()).expect("every word names a method");
     method.search.cost_update = args.cost_update == Switch::On;
     method.failure_cost_s = args.failure_cost;
-    if args.guide == Guide::Paper { method.with_learn_and_link() } else { method }
+    if args.verify != "auto" {
+        let episodes = args.verify.parse().ok().filter(|episodes| (1..=EPISODES_MAX).contains(episodes));
+        let usage = || {
+            let message =
+                format!("--verify is {:?}, expected auto or a number from 1 to {EPISODES_MAX}", args.verify);
+            Failure::new("USAGE", message)
+        };
+        (method.verify_episodes, method.verify_half_width) = (episodes.ok_or_else(usage)?, 0.0);
+    }
+    Ok(if args.guide == Guide::Paper { method.with_learn_and_link() } else { method })
 }
 
 /// The folder asked for, or a fresh one.

@@ -30,12 +30,12 @@ pub struct DriveRow {
     pub failures: f32,
 }
 
-/// Rows that a network is fitted to: the loss is the likelihood of exponential times and of rare failures, whose
-/// best predictions are the means.
-#[derive(Clone, Debug, Default)]
-pub struct DriveRows(pub Vec<DriveRow>);
+/// Rows that the logarithm of the time is fitted to: the likelihood of exponential times, whose best predictions are
+/// the means.
+#[derive(Clone, Copy, Debug)]
+pub struct TimeSamples<'a>(pub &'a [DriveRow]);
 
-impl Samples for DriveRows {
+impl Samples for TimeSamples<'_> {
     fn len(&self) -> usize {
         self.0.len()
     }
@@ -45,14 +45,35 @@ impl Samples for DriveRows {
     }
 
     fn loss(&self, row: usize, outputs: &[f32], derivative: &mut [f32]) -> f64 {
-        let DriveRow { passes, time_s, failures, .. } = self.0[row];
-        let [log_time, log_risk] = [outputs[0], outputs[1]].map(|value| value.clamp(-20.0, 5.0));
-        let (taken, expected) = (time_s / libm::expf(log_time), passes * libm::expf(log_risk));
+        let DriveRow { passes, time_s, .. } = self.0[row];
+        let log_time = outputs[0].clamp(-20.0, 5.0);
+        let taken = time_s / libm::expf(log_time);
+        derivative[0] = passes - taken;
+        f64::from(taken + passes * log_time)
+    }
+}
+
+/// Rows that the logarithm of the risk is fitted to: the likelihood of rare failures.
+#[derive(Clone, Copy, Debug)]
+pub struct RiskSamples<'a>(pub &'a [DriveRow]);
+
+impl Samples for RiskSamples<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn inputs(&self, row: usize) -> &[f32] {
+        &self.0[row].inputs
+    }
+
+    fn loss(&self, row: usize, outputs: &[f32], derivative: &mut [f32]) -> f64 {
+        let DriveRow { passes, failures, .. } = self.0[row];
+        let log_risk = outputs[0].clamp(-20.0, 5.0);
+        let expected = passes * libm::expf(log_risk);
         // Where next to nobody passes the number does not matter; it must not spread to places that look alike.
         let weight = (HOPELESS * passes / failures.max(HOPELESS * passes)).min(1.0);
-        derivative[0] = passes - taken;
-        derivative[1] = weight * (expected - failures);
-        f64::from(taken + passes * log_time) + f64::from(weight * (expected - failures * log_risk))
+        derivative[0] = weight * (expected - failures);
+        f64::from(weight * (expected - failures * log_risk))
     }
 }
 

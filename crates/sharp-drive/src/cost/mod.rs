@@ -19,7 +19,7 @@ use crate::network::PolicyContext;
 use crate::situation::GuideView;
 use crate::world::World;
 
-pub use drives::{DriveRow, DriveRows, drive_rows};
+pub use drives::{DriveRow, RiskSamples, TimeSamples, drive_rows};
 use places::{PLACE_LEN, Place};
 
 /// Length of guide that a prediction speaks of, metres.
@@ -118,33 +118,29 @@ impl CostModel {
         if robot.can_turn_in_place() { turning } else { steering }
     }
 
-    /// What `guide` costs under `noise` for each of `cautions`, 0 to 1.
+    /// What `guide` costs under `noise` where the prior is told this `caution`, 0 to 1.
     #[must_use]
     pub fn predict(
         &self,
         world: &World,
         (guide, ends): (&GuideView<'_>, GuideEnds),
         noise: &NoiseModel,
-        cautions: &[f32],
-    ) -> Vec<PredictedCost> {
-        let contexts: Vec<PolicyContext> =
-            cautions.iter().map(|&caution| PolicyContext::new(noise, caution)).collect();
-        let mut costs = vec![PredictedCost::default(); cautions.len()];
+        caution: f32,
+    ) -> PredictedCost {
         let (mut scratch, mut input) = (DeployedScratch::default(), [0.0; Self::INPUTS]);
+        input[PLACE_LEN..].copy_from_slice(&PolicyContext::new(noise, caution).entries());
+        let mut cost = PredictedCost::default();
         let length_m = guide.current.length_m();
         let count = (length_m / BIN_M).ceil().max(1.0) as usize;
         for bin in 0..count {
             let arc_m = bin as f64 * BIN_M;
             let share = ((length_m - arc_m) / BIN_M).min(1.0);
             Place { arc_m, ends }.write(world, guide, &mut input[..PLACE_LEN]);
-            for (context, cost) in contexts.iter().zip(&mut costs) {
-                input[PLACE_LEN..].copy_from_slice(&context.entries());
-                let said = self.deployed.predict(&input, &mut scratch);
-                cost.time_s += share * exp(said[0]);
-                cost.risk += share * exp(said[1]);
-            }
+            let said = self.deployed.predict(&input, &mut scratch);
+            cost.time_s += share * exp(said[0]);
+            cost.risk += share * exp(said[1]);
         }
-        costs
+        cost
     }
 }
 
@@ -161,3 +157,83 @@ static SHIPPED: LazyLock<[CostModel; 2]> = LazyLock::new(|| {
         read(include_bytes!("../../assets/cost-limo.safetensors")),
     ]
 });
+
+#[cfg(test)]
+mod tests {
+    use sharp_sim::{RobotState, SimulatorKind};
+    use sharp_space::Seed;
+
+    use super::*;
+    use crate::automaton::Link;
+    use crate::initial_states::InitialStates;
+    use crate::prior::Prior;
+    use crate::test_worlds::{hall, hall_options};
+
+    const ENDS: GuideEnds = GuideEnds { from_rest: true, to_goal: true };
+
+    #[test]
+    fn every_shipped_model_can_be_read_and_written() {
+        for robot in [RobotModel::husky(), RobotModel::limo()] {
+            let model = CostModel::shipped(&robot);
+            assert_eq!(
+                &CostModel::from_bytes(&model.to_bytes()).expect("own bytes"),
+                model,
+                "{}",
+                robot.name
+            );
+        }
+        let other = Mlp::new(&[3, 4, 2], &mut Seed(1).stream("network", 0));
+        let error = CostModel::from_bytes(&other.to_bytes(&BTreeMap::new())).expect_err("no cost model");
+        assert!(error.to_string().contains("cost-format is None"), "{error}");
+        assert!(CostModel::new(other).expect_err("three inputs").to_string().contains("of 3 inputs"));
+    }
+
+    /// What drives of the whole hall show beside what is predicted of it.
+    #[test]
+    fn the_cost_of_a_hall_is_known_beforehand() {
+        let (world, options, noise) = (hall(), hall_options(), NoiseModel::nominal());
+        let (prior, model) = (Prior::shipped(&world.robot), CostModel::shipped(&world.robot));
+        let simulator = world.simulator(SimulatorKind::Kinematic);
+        let links = Link::chain(&options);
+        let start = InitialStates::exactly(RobotState::at_rest(options[0].guide.start()));
+        let context = PolicyContext::new(&noise, 1.0);
+        let policy = prior.at(1.0, &world.robot, &noise);
+        let mut rows = Vec::new();
+        let drive = (&links[..], &policy, context);
+        drive_rows((&world, &*simulator, &noise), drive, (&start, true), (200, Seed(1)), &mut rows);
+        let driven_s: f64 = rows.iter().map(|row| f64::from(row.time_s)).sum::<f64>() / 200.0;
+        assert!((8.0..25.0).contains(&driven_s), "8 m in {driven_s} s");
+        assert!(rows.iter().all(|row| row.passes <= 200.0 && row.passes > 150.0), "most arrive: {rows:?}");
+        let predicted_s: f64 = links
+            .iter()
+            .enumerate()
+            .map(|(index, link)| {
+                let ends = GuideEnds { from_rest: index == 0, to_goal: link.next.is_none() };
+                let cost = model.predict(&world, (&link.guide(), ends), &noise, 1.0);
+                assert!(cost.success() > 0.99, "an open hall: {cost:?}");
+                cost.time_s
+            })
+            .sum();
+        assert!((predicted_s / driven_s - 1.0).abs() < 0.2, "{predicted_s} s predicted, {driven_s} s driven");
+    }
+
+    #[test]
+    fn more_noise_costs_more() {
+        let (world, options) = (hall(), hall_options());
+        let guide = GuideView { current: &options[1].guide, next: None };
+        let model = CostModel::shipped(&world.robot);
+        let cost_s = |noise: &NoiseModel| {
+            model.predict(&world, (&guide, ENDS), noise, 1.0).cost_s(crate::FAILURE_COST_S)
+        };
+        let costs_s = [NoiseModel::nominal().scaled(0.5), NoiseModel::nominal(), NoiseModel::harsh()];
+        let costs_s = costs_s.map(|noise| cost_s(&noise));
+        assert!(costs_s.is_sorted(), "{costs_s:?}");
+    }
+
+    #[test]
+    fn a_cost_counts_time_and_failures() {
+        let cost = PredictedCost { time_s: 9.0, risk: -(0.9_f64.ln()) };
+        assert!((cost.success() - 0.9).abs() < 1e-12, "{cost:?}");
+        assert!((cost.cost_s(1000.0) - 110.0).abs() < 1e-9, "{}", cost.cost_s(1000.0));
+    }
+}

@@ -3,15 +3,12 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_drive::{
-    CostModel, GuideView, OptionPolicy, PolicyContext, Prior, SuccessCount, SuccessEstimate, prior_interface,
-};
+use sharp_drive::{OptionPolicy, PolicyContext, Prior, SuccessCount, SuccessEstimate, prior_interface};
 use sharp_guide::ProgressReward;
 use sharp_rl::{Exploration, SacLearner, SacStart, SacState, StopRule, TrainSettings};
 
 use super::network::{NetworkTraining, train_network};
 use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner};
-use crate::price::guide_ends;
 
 /// Rounds of successive halving: the share of the screening episodes that each candidate drives, and how many
 /// candidates go on. Those that the last round leaves are compared on all episodes.
@@ -21,13 +18,12 @@ const PRIOR_HIDDEN: [usize; 2] = [128, 128];
 /// Reward of a contact while a prior is trained on: what it was trained with at full caution.
 const FINE_CONTACT: f64 = -20.0;
 
-/// Takes the prior at the best of several degrees of caution, and a follower where that falls short; trains the prior
+/// Takes the prior, and a follower where that falls short; trains the prior
 /// on where a plan falls short and nothing at hand succeeds often enough.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Selection {
-    /// The caution that the cost model takes for best is doubted where it succeeds less often, share of episodes:
-    /// then candidates are compared.
+    /// The prior is doubted where it succeeds less often, share of episodes: then it is compared with followers.
     pub doubted_below: f64,
     /// Episodes in which candidates are compared.
     pub screening_episodes: u32,
@@ -73,7 +69,7 @@ impl OptionLearner for Selection {
         if monitor.should_stop() {
             return Err(LearnFailure::Stopped);
         }
-        let policy = predicted_best(task);
+        let policy = prior(task);
         let estimate = task.estimate(&policy);
         if estimate.count.rate() >= self.doubted_below {
             return Ok(LearntPolicy::untrained(policy, estimate));
@@ -116,17 +112,17 @@ impl OptionLearner for Selection {
 }
 
 impl Selection {
-    /// The cheapest of the prior at full caution and the fallbacks; `None` if nothing succeeds more often than `beaten`.
+    /// The cheapest of the prior and the fallbacks; `None` if nothing succeeds more often than `beaten`.
     fn choose(
         &self,
         task: &LearningTask<'_>,
         beaten: Option<SuccessCount>,
         monitor: &dyn LearningMonitor,
     ) -> Result<Option<(SuccessEstimate, OptionPolicy)>, LearnFailure> {
-        let (robot, noise) = (&task.world.robot, &task.conditions.noise);
+        let robot = &task.world.robot;
         let episodes = task.estimate_episodes;
         let allowed = (f64::from(episodes) * (1.0 - task.wanted_success)).floor() as u32;
-        let mut candidates = vec![Prior::shipped(robot).policy(robot, noise)];
+        let mut candidates = vec![prior(task)];
         candidates.extend(OptionPolicy::fallbacks(robot));
         let mut best: Option<(SuccessEstimate, OptionPolicy)> = None;
         for policy in self.cheapest(task, candidates) {
@@ -178,18 +174,10 @@ impl Selection {
     }
 }
 
-/// The prior at the caution that costs least, as its model says.
-fn predicted_best(task: &LearningTask<'_>) -> OptionPolicy {
-    let LearningTask { world, conditions, option, next, failure_cost_s, .. } = task;
-    let guide = GuideView { current: &option.guide, next: next.map(|next| &next.guide) };
-    let cautions = Prior::CAUTIONS;
-    let model = CostModel::shipped(&world.robot);
-    let costs = model.predict(world, (&guide, guide_ends(option.id)), &conditions.noise, &cautions);
-    let priced = cautions.into_iter().zip(costs);
-    let (caution, _) = priced
-        .min_by(|a, b| a.1.cost_s(*failure_cost_s).total_cmp(&b.1.cost_s(*failure_cost_s)))
-        .expect("there are cautions");
-    Prior::shipped(&world.robot).at(caution, &world.robot, &conditions.noise)
+/// The prior at the caution that fits the price of a failure.
+fn prior(task: &LearningTask<'_>) -> OptionPolicy {
+    let (robot, noise) = (&task.world.robot, &task.conditions.noise);
+    Prior::shipped(robot).at(Prior::caution(task.failure_cost_s), robot, noise)
 }
 
 /// Successive halving (Jamieson and Talwalkar 2016): each round compares fewer candidates on more episodes.
