@@ -4,12 +4,15 @@ use serde::Serialize;
 use sharp_bench::{MapReport, SolveTimes, Stopwatch, TimedMonitor, named, pictures, prepare};
 use sharp_drive::World;
 use sharp_options::{OptionKind, OptionSet};
-use sharp_plan::write_atomic;
+use sharp_export::RouteGraph;
+use sharp_plan::{Method, write_atomic};
+use sharp_sim::NoiseModel;
+use sharp_space::Seed;
 
 use crate::args::Abstract;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{SolveMonitor, spinner};
-use crate::{geojson, input};
+use crate::input;
 
 /// `sharp.abstract/1`.
 #[derive(Debug, Serialize)]
@@ -27,7 +30,7 @@ struct AbstractReport {
     time_s: SolveTimes,
 }
 
-pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
+pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failure> {
     let stopwatch = Stopwatch::start("load");
     let map = input::map(&args.map)?;
     let world = World::new(map.grid.clone(), named::robot(&args.abstraction.robot)?);
@@ -45,8 +48,9 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
         pictures::write(&args.out, "regions", &pictures::regions(&map.grid, criticality, &regions))?;
     }
     pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
-    let route = geojson::route(&abstraction, world.robot.max_speed_mps);
-    write_atomic(&args.out.join("route.geojson"), route.as_bytes())?;
+    let method = Method::default();
+    let graph = RouteGraph::of_options(world, &abstraction, &method, &NoiseModel::nominal(), Seed(seed));
+    write_atomic(&args.out.join("route.geojson"), graph.to_geojson().as_bytes())?;
 
     let rbvd = &file.rbvd;
     let report = AbstractReport {
