@@ -89,8 +89,7 @@ fn recordings_decode_topic_by_topic() {
     let planned = export("mcap", "plan.mcap");
     assert_eq!(fs::read(&planned[0]).ok(), fs::read(&export("mcap", "again.mcap")[0]).ok(), "equal bytes");
     let driven = folder.path().join("drives.mcap");
-    let output =
-        sharp(&["--json", "run", text(plan_dir), "--episodes", "3", "--record", text(&driven)]);
+    let output = sharp(&["--json", "run", text(plan_dir), "--episodes", "3", "--record", text(&driven)]);
     assert!(output.status.success(), "{output:?}");
     let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     for (file, outcomes, last) in [(&planned[0], 1, "planned"), (&driven, 3, "episode 3: ")] {
@@ -180,8 +179,13 @@ fn a_route_leads_over_the_graph_of_a_plan() {
     assert_eq!(fs::read_to_string(&files[0]).ok(), Some(graph.to_geojson()), "what is exported");
     check_edges(&plan.world.grid, &graph, "the plan");
     let driven_s: f64 = plan.solution.steps.iter().map(|step| step.arrival_time_s).sum();
-    let planned_s: f64 =
-        graph.edges.iter().map(|edge| &edge.metadata).filter(|edge| edge.planned).map(|edge| edge.time_s).sum();
+    let planned_s: f64 = graph
+        .edges
+        .iter()
+        .map(|edge| &edge.metadata)
+        .filter(|edge| edge.planned)
+        .map(|edge| edge.time_s)
+        .sum();
     assert!((driven_s - planned_s).abs() < 1e-6, "edges share the time of their option: {planned_s}");
     if let Some(said) = example("read_geojson.py", &[&files[0]]) {
         assert!(said.contains("route of "), "{said}");
@@ -199,7 +203,11 @@ fn check_edges(grid: &OccupancyGrid, graph: &RouteGraph, name: &str) {
         for row in low(a.y, b.y)..high(a.y, b.y, frame.height) {
             for col in low(a.x, b.x)..high(a.x, b.x, frame.width) {
                 let is_hit = !grid.is_free(Cell::new(col, row)) && meets(a, b, col as f64, row as f64);
-                assert!(!is_hit, "{name}: {} from {from} to {to} meets cell {col}, {row}", edge.metadata.option);
+                assert!(
+                    !is_hit,
+                    "{name}: {} from {from} to {to} meets cell {col}, {row}",
+                    edge.metadata.option
+                );
             }
         }
         assert!(is_line_free(grid, from, to), "{name}: the same by rows");
@@ -227,9 +235,11 @@ fn meets(a: sharp_space::Vector, b: sharp_space::Vector, col: f64, row: f64) -> 
 /// The graph of the options on a map, and how many options have no guide.
 fn options_graph(grid: OccupancyGrid, robot: RobotModel, kind: OptionKind) -> (World, RouteGraph) {
     let world = World::new(grid, robot);
-    let mut sharp = sharp_plan::Sharp::new(world.clone(), sharp_regions::GeometricDetector::default()).with_options(kind);
+    let mut sharp =
+        sharp_plan::Sharp::new(world.clone(), sharp_regions::GeometricDetector::default()).with_options(kind);
     let abstraction = sharp.abstraction(&()).expect("room for the robot").clone();
-    let graph = RouteGraph::of_options(&world, &abstraction, &Method::default(), &NoiseModel::nominal(), Seed(1));
+    let graph =
+        RouteGraph::of_options(&world, &abstraction, &Method::default(), &NoiseModel::nominal(), Seed(1));
     let planned = graph.edges.iter().map(|edge| edge.metadata.option.clone());
     let planned: std::collections::BTreeSet<String> = planned.collect();
     let all = abstraction.options.options().len();

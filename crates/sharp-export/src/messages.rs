@@ -26,11 +26,13 @@ const POINT: (&str, &str) = ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat
 const POINT32: (&str, &str) = ("geometry_msgs/Point32", "float32 x\nfloat32 y\nfloat32 z");
 const QUATERNION: (&str, &str) =
     ("geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1");
-const POSE: (&str, &str) = ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation");
+const POSE: (&str, &str) =
+    ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation");
 const POSE_STAMPED: (&str, &str) =
     ("geometry_msgs/PoseStamped", "std_msgs/Header header\ngeometry_msgs/Pose pose");
 const VECTOR3: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z");
-const TWIST: (&str, &str) = ("geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular");
+const TWIST: (&str, &str) =
+    ("geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular");
 
 pub(crate) const OCCUPANCY_GRID: MessageType = MessageType {
     name: "nav_msgs/msg/OccupancyGrid",

@@ -25,10 +25,13 @@ pub struct PlanNetwork {
 pub fn networks(plan: &Plan) -> Vec<PlanNetwork> {
     let mut found: Vec<PlanNetwork> = Vec::new();
     for step in &plan.solution.steps {
-        let OptionPolicy::Network(NetworkPolicy { interface, actor, .. }) = &step.learnt.policy else { continue };
+        let OptionPolicy::Network(NetworkPolicy { interface, actor, .. }) = &step.learnt.policy else {
+            continue;
+        };
         let option = (step.option.id.to_string(), *interface);
         let scale = action_scale(interface);
-        let same = |other: &&mut PlanNetwork| action_scale(&other.interface) == scale && *other.actor == **actor;
+        let same =
+            |other: &&mut PlanNetwork| action_scale(&other.interface) == scale && *other.actor == **actor;
         match found.iter_mut().find(same) {
             Some(network) => network.options.push(option),
             None => found.push(PlanNetwork {
@@ -68,7 +71,8 @@ impl PlanNetwork {
             PolicyInterface::Guide { base, .. } => ("guide", serde_json::to_string(base)),
             PolicyInterface::Absolute { .. } => ("absolute", Ok("null".to_owned())),
         };
-        let contexts: BTreeMap<&str, _> = self.options.iter().map(|(id, to)| (id.as_str(), context(to))).collect();
+        let contexts: BTreeMap<&str, _> =
+            self.options.iter().map(|(id, to)| (id.as_str(), context(to))).collect();
         let names: Vec<&str> = self.options.iter().map(|(id, _)| id.as_str()).collect();
         BTreeMap::from([
             ("sharp.robot".to_owned(), plan.world.robot.name.clone()),

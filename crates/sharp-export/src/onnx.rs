@@ -96,7 +96,8 @@ fn graph(actor: &Actor, action_scale: &[f64]) -> Message {
     graph.tensor("action_scale", &[spec.action_len], &scale);
     graph.node("Mul", &["action", "action_scale"], "scaled_action");
     let message = graph.nodes.iter().fold(Message::new(), |message, node| message.message(1, node));
-    let message = graph.tensors.iter().fold(message.text(2, "policy"), |message, tensor| message.message(5, tensor));
+    let message =
+        graph.tensors.iter().fold(message.text(2, "policy"), |message, tensor| message.message(5, tensor));
     message
         .message(11, &value("observation", spec.observation_len))
         .message(12, &value("action", spec.action_len))

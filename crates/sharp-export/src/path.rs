@@ -49,7 +49,8 @@ impl PlannedPath {
     pub fn new(plan: &Plan) -> Self {
         let profile = ProfiledFollower::tuned(&plan.world.robot, &plan.noise).speed;
         let steps = &plan.solution.steps;
-        let paces: Vec<LegPace> = steps.iter().map(|step| LegPace::new(&plan.world, &profile, step)).collect();
+        let paces: Vec<LegPace> =
+            steps.iter().map(|step| LegPace::new(&plan.world, &profile, step)).collect();
         let legs_s: f64 = paces.iter().map(|pace| pace.time_s).sum();
         let predicted_s = plan.solution.predicted_time_s;
         let stretch = if predicted_s > 0.0 && legs_s > 0.0 { predicted_s / legs_s } else { 1.0 };

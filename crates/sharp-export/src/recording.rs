@@ -162,8 +162,12 @@ impl File {
         }
         let channel = self.channels.get_mut(topic).expect("just made");
         let time = nanoseconds(time_s);
-        let header =
-            MessageHeader { channel_id: channel.id, sequence: channel.sequence, log_time: time, publish_time: time };
+        let header = MessageHeader {
+            channel_id: channel.id,
+            sequence: channel.sequence,
+            log_time: time,
+            publish_time: time,
+        };
         channel.sequence += 1;
         Ok(self.writer.write_to_known_channel(&header, payload)?)
     }

@@ -10,13 +10,16 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use sharp_drive::{ProfiledFollower, SuccessCount, SuccessEstimate, World};
 use sharp_guide::{GuidePath, LegId, NoGuide, UnguidedOption};
-use sharp_options::{OptionId, OptionSpec};
+use sharp_options::{EndpointId, OptionId, OptionSpec};
 use sharp_plan::{Abstraction, Method, Plan};
 use sharp_sim::NoiseModel;
 use sharp_space::{Point, Seed};
 
 use crate::path::FRAME;
 use crate::way::{corners, is_line_free};
+
+/// Places nearer than this are one, metres.
+const SAME_PLACE_M: f64 = 1e-9;
 
 /// A route graph.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -117,7 +120,8 @@ impl RouteGraph {
         let mut before = graph.node(first.option.guide.start().position);
         for step in &plan.solution.steps {
             let guide = &step.option.guide;
-            let after = graph.node(guide.end().position);
+            let (_, endpoint) = step.option.id.endpoints(&plan.abstraction.options);
+            let after = graph.end_node(guide.end().position, endpoint);
             let count = Some(step.on_arrival).filter(|count| count.successes > 0);
             let time_s = match count {
                 Some(_) => step.arrival_time_s,
@@ -127,7 +131,7 @@ impl RouteGraph {
             let way = Way { guide, name: step.option.id.to_string(), time_s, count };
             graph.add(&plan.world, &way, (before, after));
             graph.edges[begun..].iter_mut().for_each(|edge| edge.metadata.planned = true);
-            if let (_, Some(endpoint)) = step.option.id.endpoints(&plan.abstraction.options) {
+            if let Some(endpoint) = endpoint {
                 graph.join(&plan.world, after, endpoint.0 as usize);
             }
             before = after;
@@ -140,10 +144,7 @@ impl RouteGraph {
     pub fn to_geojson(&self) -> String {
         let point = |index: usize| [self.nodes[index].x, self.nodes[index].y];
         let nodes = (0..self.nodes.len()).map(|id| {
-            feature(
-                json!({ "id": id, "frame": FRAME }),
-                json!({ "type": "Point", "coordinates": point(id) }),
-            )
+            feature(json!({ "id": id, "frame": FRAME }), json!({ "type": "Point", "coordinates": point(id) }))
         });
         let edges = self.edges.iter().zip(self.nodes.len()..).map(|(edge, id)| {
             let properties = json!({
@@ -158,6 +159,14 @@ impl RouteGraph {
         });
         let features: Vec<Value> = nodes.chain(edges).collect();
         json!({ "type": "FeatureCollection", "name": "graph", "features": features }).to_string() + "\n"
+    }
+
+    /// The node of an endpoint if `place` is its centre, else a new one.
+    fn end_node(&mut self, place: Point, endpoint: Option<EndpointId>) -> usize {
+        match endpoint.map(|id| id.0 as usize) {
+            Some(node) if (self.nodes[node] - place).norm() < SAME_PLACE_M => node,
+            _ => self.node(place),
+        }
     }
 
     fn node(&mut self, place: Point) -> usize {
@@ -194,14 +203,12 @@ impl RouteGraph {
         let steps = plan.solution.steps.iter().filter(|step| step.learnt.estimate.count.successes > 0);
         let measured: BTreeMap<String, &SuccessEstimate> =
             steps.map(|step| (step.option.id.to_string(), &step.learnt.estimate)).collect();
-        for EdgeMetadata { option, length_m, time_s, option_length_m, option_time_s, option_success, option_success_lower95, .. } in
-            self.edges.iter_mut().map(|edge| &mut edge.metadata)
-        {
-            let Some(estimate) = measured.get(option) else { continue };
-            *option_time_s = estimate.mean_time_s;
-            *time_s = estimate.mean_time_s * *length_m / *option_length_m;
-            *option_success = Some(estimate.count.rate());
-            *option_success_lower95 = Some(estimate.count.lower95());
+        for told in self.edges.iter_mut().map(|edge| &mut edge.metadata) {
+            let Some(estimate) = measured.get(&told.option) else { continue };
+            told.option_time_s = estimate.mean_time_s;
+            told.time_s = estimate.mean_time_s * told.length_m / told.option_length_m;
+            told.option_success = Some(estimate.count.rate());
+            told.option_success_lower95 = Some(estimate.count.lower95());
         }
     }
 
@@ -209,7 +216,7 @@ impl RouteGraph {
     fn join(&mut self, world: &World, a: usize, b: usize) {
         let (from, to) = (self.nodes[a], self.nodes[b]);
         let length_m = (to - from).norm();
-        if length_m <= 0.0 || !is_line_free(&world.grid, from, to) {
+        if length_m < SAME_PLACE_M || !is_line_free(&world.grid, from, to) {
             return;
         }
         let time_s = length_m / (0.5 * world.robot.max_speed_mps);

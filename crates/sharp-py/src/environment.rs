@@ -104,11 +104,17 @@ impl Tasks {
         let actions = from_bytes(actions);
         let wanted = slots.len() * PolicyInterface::ACTION_LEN;
         if actions.len() != wanted || begins.len() != slots.len() {
-            return Err(Failure::new("USAGE", format!("{} numbers of actions, expected {wanted}", actions.len())));
+            return Err(Failure::new(
+                "USAGE",
+                format!("{} numbers of actions, expected {wanted}", actions.len()),
+            ));
         }
         py.detach(|| {
             let given = actions.par_chunks_exact(PolicyInterface::ACTION_LEN).zip(begins);
-            slots.par_iter_mut().zip(given).for_each(|(slot, (action, begins))| slot.step(action, *begins == 1));
+            slots
+                .par_iter_mut()
+                .zip(given)
+                .for_each(|(slot, (action, begins))| slot.step(action, *begins == 1));
         });
         let observations: Vec<f32> = slots.iter().flat_map(|slot| slot.observation.iter().copied()).collect();
         let rewards: Vec<f32> = slots.iter().map(|slot| slot.step.reward).collect();

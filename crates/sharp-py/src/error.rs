@@ -11,9 +11,8 @@ use sharp_plan::FileError;
 /// The exception with this code, as in `GOAL_OCCUPIED`, and this message.
 pub(crate) fn exception(code: &str, message: impl Display) -> PyErr {
     Python::attach(|py| {
-        let make = || {
-            PyModule::import(py, "sharp._errors")?.getattr("make")?.call1((code, message.to_string()))
-        };
+        let make =
+            || PyModule::import(py, "sharp._errors")?.getattr("make")?.call1((code, message.to_string()));
         make().map_or_else(|error| error, PyErr::from_value)
     })
 }

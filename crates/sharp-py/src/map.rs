@@ -32,7 +32,12 @@ pub(crate) struct Map {
 impl Map {
     /// Reads the map that `spec` names: a file, or one of the project's own environments.
     #[staticmethod]
-    fn load(spec: &str, resolution: Option<f64>, unknown_free: bool, allow_outside: bool) -> Result<Self, Failure> {
+    fn load(
+        spec: &str,
+        resolution: Option<f64>,
+        unknown_free: bool,
+        allow_outside: bool,
+    ) -> Result<Self, Failure> {
         let options = LoadOptions { resolution_m: resolution, unknown_free, allow_outside };
         Ok(Self { file: load(spec, &options)? })
     }

@@ -46,7 +46,8 @@ impl Plan {
     #[staticmethod]
     fn load(folder: PathBuf) -> Result<Self, Failure> {
         let map = folder.join("map.yaml");
-        let spec = map.to_str().ok_or_else(|| Failure::new("FILE_INVALID", "the folder's name is not printable"))?;
+        let spec =
+            map.to_str().ok_or_else(|| Failure::new("FILE_INVALID", "the folder's name is not printable"))?;
         let grid = load(spec, &LoadOptions::default())?.grid;
         Ok(Self { plan: Arc::new(SolvedPlan::load(&folder, grid)?), solved: None })
     }
@@ -139,7 +140,9 @@ impl Plan {
             })
         })?;
         if files.is_empty() {
-            return Err(Failure::new("NO_NETWORK", "hand-written followers drive all legs of this plan").into());
+            return Err(
+                Failure::new("NO_NETWORK", "hand-written followers drive all legs of this plan").into()
+            );
         }
         Ok(files.iter().map(|bytes| PyBytes::new(py, bytes)).collect())
     }
@@ -150,7 +153,8 @@ impl Plan {
         match &step.learnt.policy {
             OptionPolicy::Network(network) => Ok(Policy::new(&step.option.id.to_string(), network)),
             other => {
-                let message = format!("leg {index}, {}, is driven by a {} policy", step.option.id, other.kind());
+                let message =
+                    format!("leg {index}, {}, is driven by a {} policy", step.option.id, other.kind());
                 Err(Failure::new("NO_NETWORK", message))
             }
         }
@@ -172,7 +176,8 @@ impl Plan {
     }
 
     fn write_recording(&self, file: &Path, recordings: &[Recording]) -> Result<(), Failure> {
-        let bytes = driven_mcap(&self.plan, recordings).map_err(|error| Failure::new("FILE_INVALID", error))?;
+        let bytes =
+            driven_mcap(&self.plan, recordings).map_err(|error| Failure::new("FILE_INVALID", error))?;
         Ok(write_atomic(file, &bytes)?)
     }
 }

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use sharp_bench::{
-    AbstractionRequest, NamedProblem, SolveSettings, Solved, Stopwatch, TimedMonitor, named, solve as solve_problem,
-    to_json,
+    AbstractionRequest, NamedProblem, SolveSettings, Solved, Stopwatch, TimedMonitor, named,
+    solve as solve_problem, to_json,
 };
 use sharp_drive::World;
 use sharp_options::OptionKind;
@@ -83,7 +83,10 @@ impl Settings {
             "centroid" => OptionKind::Centroid,
             "interface" => OptionKind::Interface,
             other => {
-                return Err(Failure::new("USAGE", format!("options is {other:?}, expected centroid or interface")));
+                return Err(Failure::new(
+                    "USAGE",
+                    format!("options is {other:?}, expected centroid or interface"),
+                ));
             }
         };
         let mut method = Method::by_name(&self.learning).ok_or_else(|| {
@@ -91,7 +94,10 @@ impl Settings {
         })?;
         if let Some(seconds) = self.failure_cost {
             if !(seconds.is_finite() && seconds >= 0.0) {
-                return Err(Failure::new("USAGE", format!("failure_cost is {seconds}, expected seconds, 0 or more")));
+                return Err(Failure::new(
+                    "USAGE",
+                    format!("failure_cost is {seconds}, expected seconds, 0 or more"),
+                ));
             }
             method.failure_cost_s = seconds;
         }
@@ -110,5 +116,6 @@ impl Settings {
 
 /// The simulator called `name`.
 pub(crate) fn simulator(name: &str) -> Result<SimulatorKind, Failure> {
-    name.parse().map_err(|error: sharp_sim::UnknownSimulator| Failure::new("USAGE", format!("simulator: {error}")))
+    name.parse()
+        .map_err(|error: sharp_sim::UnknownSimulator| Failure::new("USAGE", format!("simulator: {error}")))
 }

@@ -28,7 +28,7 @@ const fn room(
 }
 
 /// All crates, each after those that it uses.
-const ROOMS: [Room; 17] = [
+const ROOMS: [Room; 18] = [
     room(0, "sharp-space", &[], &[]),
     room(0, "sharp-rl", &[], &[]),
     // Tests drive through generated floor plans.
@@ -100,6 +100,7 @@ const ROOMS: [Room; 17] = [
         &[],
     ),
     room(6, "sharp-cli", LIBRARIES, LIBRARIES),
+    room(6, "sharp-py", LIBRARIES, LIBRARIES),
     room(6, "sharp-tests", LIBRARIES, LIBRARIES),
     room(6, "xtask", &[], &[]),
 ];

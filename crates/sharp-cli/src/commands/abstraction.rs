@@ -3,16 +3,16 @@
 use serde::Serialize;
 use sharp_bench::{MapReport, SolveTimes, Stopwatch, TimedMonitor, named, pictures, prepare};
 use sharp_drive::World;
-use sharp_options::{OptionKind, OptionSet};
 use sharp_export::RouteGraph;
+use sharp_options::{OptionKind, OptionSet};
 use sharp_plan::{Method, write_atomic};
 use sharp_sim::NoiseModel;
 use sharp_space::Seed;
 
 use crate::args::Abstract;
+use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{SolveMonitor, spinner};
-use crate::input;
 
 /// `sharp.abstract/1`.
 #[derive(Debug, Serialize)]

@@ -40,7 +40,8 @@ pub(crate) fn run(args: &Export, json: bool) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     for ExportedFile { path, bytes, options } in &report.files {
-        let drives = if options.is_empty() { String::new() } else { format!(", drives {}", options.join(" ")) };
+        let drives =
+            if options.is_empty() { String::new() } else { format!(", drives {}", options.join(" ")) };
         say!("{path}: {bytes} bytes{drives}");
     }
     Ok(Exit::Done)
@@ -80,8 +81,12 @@ fn each(
 ) -> Result<Vec<Content>, Failure> {
     let networks = networks(plan);
     if networks.is_empty() {
-        let policies: Vec<String> =
-            plan.solution.steps.iter().map(|step| format!("{} {}", step.option.id, step.learnt.policy.kind())).collect();
+        let policies: Vec<String> = plan
+            .solution
+            .steps
+            .iter()
+            .map(|step| format!("{} {}", step.option.id, step.learnt.policy.kind()))
+            .collect();
         let message = format!(
             "the plan has no network to export, its legs are driven by hand-written followers: {}",
             policies.join(", ")

@@ -214,7 +214,7 @@ class Run:
     @property
     def success_rate(self) -> float:
         """Share of the episodes that reached the goal."""
-        return self.report["success_rate"]
+        return float(self.report["success_rate"])
 
 
 @dataclass(frozen=True)
@@ -300,12 +300,12 @@ class Plan:
     @property
     def predicted(self) -> dict[str, float]:
         """`success`, the lower end of its 95 % interval as `lower95`, and `sim_time_s`."""
-        return self._message["predicted"]
+        return dict(self._message["predicted"])
 
     @property
     def legs(self) -> list[dict[str, Any]]:
         """`option`, `role`, `policy`, `length_m`, `time_s` and `success` on arrival of each leg."""
-        return self._message["legs"]
+        return list(self._message["legs"])
 
     def path(self) -> NDArray[np.float64]:
         """Rows of x, y, yaw, arc length, time, speed and leg."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 # Names and numbers of Nav2's planner errors.
 _NAV2 = {
     "START_OUTSIDE_MAP": 203,
@@ -22,18 +24,18 @@ class SharpError(Exception):
         #: Nav2's number for the code, where it has one.
         self.nav2: int | None = _NAV2.get(code)
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.code, str(self))
 
 
 class NoPlanError(SharpError):
     """There is no plan, or none was found in time; the text says why. `report` is what `sharp solve --json` prints."""
 
-    def __init__(self, code: str, message: str, report: dict | None = None) -> None:
+    def __init__(self, code: str, message: str, report: dict[str, Any] | None = None) -> None:
         super().__init__(code, message)
-        self.report = report or {}
+        self.report: dict[str, Any] = report or {}
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.code, str(self), self.report)
 
 

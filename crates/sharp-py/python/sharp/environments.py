@@ -32,7 +32,7 @@ def _tasks(plan: Plan, leg: int | None, count: int, settings: dict[str, Any]) ->
     return _core.Tasks(plan._core, _Options(leg=leg, count=count, **settings))
 
 
-def _spaces(tasks: _core.Tasks, observation: str) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
+def _spaces(tasks: _core.Tasks, observation: str) -> tuple[Any, Any]:
     bound = _BOUND[observation]
     seen = gymnasium.spaces.Box(-bound, bound, (tasks.observation_len,), np.float32)
     return seen, gymnasium.spaces.Box(-1.0, 1.0, (tasks.action_len,), np.float32)
@@ -108,7 +108,7 @@ class ProblemEnv(_Env):
         super().__init__(plan, None, _settings(observation, reward, noise, simulator))
 
 
-class VectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]):
+class VectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """Many of them side by side, on all threads: a leg of a plan, or with `leg=None` the whole problem.
 
     After the end of an episode the next action of its slot is ignored and begins another (`AutoresetMode.NEXT_STEP`).
