@@ -19,11 +19,11 @@ use sharp_rl::ActorScratch;
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{Cell, OccupancyGrid, Point, Seed};
 
-/// A plan that is solved once for all tests: environment `a`, its second problem, the Limo.
+/// A plan that is solved once for all tests: environment `a`, its second problem, the Husky.
 static PLAN: LazyLock<(tempfile::TempDir, PathBuf)> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a folder");
     let plan = folder.path().join("plan");
-    let args = ["solve", "a", "--problem", "2", "--robot", "limo", "--library", "none", "--out"];
+    let args = ["solve", "a", "--problem", "2", "--library", "none", "--out"];
     let output = sharp(&[&args[..], &[text(&plan)]].concat());
     assert!(output.status.success(), "{output:?}");
     (folder, plan)

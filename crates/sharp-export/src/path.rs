@@ -16,6 +16,11 @@ pub(crate) const FRAME: &str = "map";
 /// The distance between two values of [`SpeedProfile::along`], metres.
 const PROFILE_SPACING_M: f64 = 0.25;
 
+/// A profile that is so many times faster is at the top speed everywhere.
+const FASTER_MAX: f64 = 1024.0;
+/// Halvings after which the factor of a profile is exact.
+const BISECTIONS: u32 = 60;
+
 /// One pose of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathPoint {
@@ -35,8 +40,9 @@ pub struct PathPoint {
 ///
 /// Times are predictions. Where a leg is slow and where it is fast comes from the speed profile of a follower tuned for
 /// the noise of the plan. How long the leg takes comes from the plan: the mean time of its successes when it is
-/// entered the way the one before it arrives. All times are then scaled so that the path ends at the plan's predicted
-/// time. A robot that cuts corners drives less than the path is long, so a speed may be a little above the top speed.
+/// entered the way the one before it arrives, scaled so that the path ends at the plan's predicted time. No speed is
+/// above the robot's top speed, unless a leg takes less time than its guide at that speed, which is for robots that cut
+/// corners.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedPath {
     /// Its poses; times and arc lengths never fall.
@@ -49,27 +55,26 @@ impl PlannedPath {
     pub fn new(plan: &Plan) -> Self {
         let profile = ProfiledFollower::tuned(&plan.world.robot, &plan.noise).speed;
         let steps = &plan.solution.steps;
-        let paces: Vec<LegPace> =
-            steps.iter().map(|step| LegPace::new(&plan.world, &profile, step)).collect();
-        let legs_s: f64 = paces.iter().map(|pace| pace.time_s).sum();
-        let predicted_s = plan.solution.predicted_time_s;
+        let plain_s: Vec<f64> = steps.iter().map(|step| leg_time_s(&plan.world, &profile, step)).collect();
+        let (legs_s, predicted_s) = (plain_s.iter().sum::<f64>(), plan.solution.predicted_time_s);
         let stretch = if predicted_s > 0.0 && legs_s > 0.0 { predicted_s / legs_s } else { 1.0 };
         let mut points: Vec<PathPoint> = Vec::new();
         let (mut arc_m, mut time_s) = (0.0, 0.0);
-        for (number, (step, pace)) in steps.iter().zip(&paces).enumerate() {
+        for (number, (step, leg_s)) in steps.iter().zip(plain_s).enumerate() {
             let guide = &step.option.guide;
+            let pace = LegPace::new(&plan.world, &profile, guide, stretch * leg_s);
             if points.last().is_some_and(|last| last.pose.distance_m(&guide.start()) < 1e-6) {
                 points.pop();
             }
             points.extend((0..guide.poses().len()).map(|i| PathPoint {
                 pose: guide.poses()[i],
                 arc_m: arc_m + guide.arc_m(i),
-                time_s: time_s + stretch * pace.times_s[i],
-                speed_mps: pace.speeds_mps[i] / stretch,
+                time_s: time_s + pace.times_s[i],
+                speed_mps: pace.speeds_mps[i],
                 step: number,
             }));
             arc_m += guide.length_m();
-            time_s += stretch * pace.time_s;
+            time_s += stretch * leg_s;
         }
         Self { points }
     }
@@ -109,31 +114,54 @@ impl PlannedPath {
     }
 }
 
+/// The time of a leg, seconds: measured on arrival, or that of the profile where no arrival succeeded.
+fn leg_time_s(world: &World, profile: &SpeedProfile, step: &PlannedOption) -> f64 {
+    let is_measured = step.arrival_time_s.is_finite() && step.arrival_time_s > 0.0;
+    if is_measured { step.arrival_time_s } else { profile.time_s(world, &step.option.guide) }
+}
+
 /// The speed at each pose of a leg's guide, and when the robot is there.
 struct LegPace {
     speeds_mps: Vec<f64>,
     times_s: Vec<f64>,
-    /// Time of the whole leg, seconds.
-    time_s: f64,
 }
 
 impl LegPace {
-    fn new(world: &World, profile: &SpeedProfile, step: &PlannedOption) -> Self {
-        let guide = &step.option.guide;
-        let mut speeds_mps = profiled_speeds_mps(world, profile, guide);
-        let mut times_s = vec![0.0];
-        for i in 1..guide.poses().len() {
-            let gap_m = guide.arc_m(i) - guide.arc_m(i - 1);
-            times_s.push(times_s[i - 1] + 2.0 * gap_m / (speeds_mps[i - 1] + speeds_mps[i]));
+    /// The profile, faster or slower everywhere by one factor but nowhere above the top speed, so that `guide` takes
+    /// `time_s`. Where that cannot be, the robot cuts corners, and one speed above the top is all that fits.
+    fn new(world: &World, profile: &SpeedProfile, guide: &GuidePath, time_s: f64) -> Self {
+        let (profiled, top_mps) = (profiled_speeds_mps(world, profile, guide), world.robot.max_speed_mps);
+        let at =
+            |factor: f64| profiled.iter().map(|speed| (factor * speed).min(top_mps)).collect::<Vec<f64>>();
+        let (mut slow, mut fast) = (0.0, 1.0);
+        while takes_s(guide, &at(fast)) > time_s && fast < FASTER_MAX {
+            (slow, fast) = (fast, 2.0 * fast);
         }
-        let profiled_s = times_s[times_s.len() - 1];
-        let is_measured = step.arrival_time_s.is_finite() && step.arrival_time_s > 0.0;
-        let time_s = if is_measured { step.arrival_time_s } else { profiled_s };
-        let stretch = time_s / profiled_s;
-        times_s.iter_mut().for_each(|time| *time *= stretch);
-        speeds_mps.iter_mut().for_each(|speed| *speed /= stretch);
-        Self { speeds_mps, times_s, time_s }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (slow + fast);
+            let is_slow = takes_s(guide, &at(middle)) > time_s;
+            (slow, fast) = if is_slow { (middle, fast) } else { (slow, middle) };
+        }
+        let speeds = at(fast);
+        let left = takes_s(guide, &speeds) / time_s;
+        let speeds_mps: Vec<f64> = speeds.into_iter().map(|speed| speed * left).collect();
+        let times_s = times_s(guide, &speeds_mps);
+        Self { speeds_mps, times_s }
     }
+}
+
+/// When a robot with these speeds is at each pose of `guide`, seconds from the first.
+fn times_s(guide: &GuidePath, speeds_mps: &[f64]) -> Vec<f64> {
+    let mut times_s = vec![0.0];
+    for i in 1..guide.poses().len() {
+        let gap_m = guide.arc_m(i) - guide.arc_m(i - 1);
+        times_s.push(times_s[i - 1] + 2.0 * gap_m / (speeds_mps[i - 1] + speeds_mps[i]));
+    }
+    times_s
+}
+
+fn takes_s(guide: &GuidePath, speeds_mps: &[f64]) -> f64 {
+    times_s(guide, speeds_mps).last().copied().unwrap_or(0.0)
 }
 
 /// What the profile drives at each pose of `guide`, metres per second; positive.

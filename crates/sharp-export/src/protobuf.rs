@@ -8,7 +8,7 @@ pub(crate) struct Message {
 
 /// How a field is laid out.
 #[derive(Clone, Copy)]
-enum Wire {
+enum WireType {
     Varint = 0,
     Bytes = 2,
 }
@@ -21,14 +21,14 @@ impl Message {
 
     /// The message with a whole number in `field`.
     pub(crate) fn number(mut self, field: u32, number: u64) -> Self {
-        self.key(field, Wire::Varint);
+        self.key(field, WireType::Varint);
         varint(&mut self.bytes, number);
         self
     }
 
     /// The message with bytes in `field`.
     pub(crate) fn bytes(mut self, field: u32, bytes: &[u8]) -> Self {
-        self.key(field, Wire::Bytes);
+        self.key(field, WireType::Bytes);
         varint(&mut self.bytes, bytes.len() as u64);
         self.bytes.extend(bytes);
         self
@@ -49,7 +49,7 @@ impl Message {
         self.bytes
     }
 
-    fn key(&mut self, field: u32, wire: Wire) {
+    fn key(&mut self, field: u32, wire: WireType) {
         varint(&mut self.bytes, u64::from(field << 3 | wire as u32));
     }
 }

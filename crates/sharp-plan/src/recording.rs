@@ -43,24 +43,24 @@ pub fn record(
 ) -> Vec<Recording> {
     let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
     episodes(plan, settings, |mut episode, policy| {
-        let mut recorder = Recorder { policy, state: *episode.state(), time_s: 0.0, moments: Vec::new() };
-        let end = episode.drive(&mut recorder, &supervisor);
-        recorder.note(None);
-        let execution = Execution { end, record: episode.into_record(), events: recorder.policy.events() };
-        Recording { execution, moments: recorder.moments }
+        let mut noted = NotedPolicy { policy, state: *episode.state(), time_s: 0.0, moments: Vec::new() };
+        let end = episode.drive(&mut noted, &supervisor);
+        noted.note(None);
+        let execution = Execution { end, record: episode.into_record(), events: noted.policy.events() };
+        Recording { execution, moments: noted.moments }
     })
 }
 
 /// A composed policy whose decisions are noted.
 #[derive(Debug)]
-struct Recorder {
+struct NotedPolicy {
     policy: ComposedPolicy,
     state: RobotState,
     time_s: f64,
     moments: Vec<Moment>,
 }
 
-impl Recorder {
+impl NotedPolicy {
     /// Notes what is now; the last decision of all is asked for at the end, and noted once.
     fn note(&mut self, command: Option<Command>) {
         if self.moments.last().is_some_and(|last| last.time_s >= self.time_s) {
@@ -76,7 +76,7 @@ impl Recorder {
     }
 }
 
-impl Controller for Recorder {
+impl Controller for NotedPolicy {
     fn decide(&mut self) -> Decision {
         let decision = self.policy.decide();
         self.note(if let Decision::Drive(command) = decision { Some(command) } else { None });

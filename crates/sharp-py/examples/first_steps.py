@@ -20,12 +20,12 @@ folder.mkdir(parents=True, exist_ok=True)
 
 # %% [markdown]
 # ## A map and a problem
-# Maps come from files, from arrays, or from the project. This is environment `a`, a flat of 15 x 15 m. The robot is a Limo, a car
-# of 0.32 m.
+# Maps come from files, from arrays, or from the project. This is environment `a`, a flat of 15 x 15 m. The robot is a Husky, 1 m long, that
+# turns in place.
 
 # %%
 map = sharp.Map("a")
-plan = sharp.solve(map, "limo", problem=2, progress=lambda phase, message: print(f"  {phase}: {message}"))
+plan = sharp.solve(map, "husky", problem=2, progress=lambda phase, message: print(f"  {phase}: {message}"))
 print(f"predicted success {plan.predicted['success']:.3f}, {plan.predicted['sim_time_s']:.1f} s of driving")
 for leg in plan.legs:
     print(f"  {leg['option']:<16} {leg['length_m']:5.1f} m  {leg['time_s']:5.1f} s  success {leg['success']:.3f}  {leg['policy']}")

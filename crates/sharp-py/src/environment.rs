@@ -16,8 +16,8 @@ use sharp_rl::{Environment, Step};
 use sharp_sim::RobotState;
 use sharp_space::{Seed, Stream};
 
-use crate::error::Failure;
-use crate::plan::Plan;
+use crate::error::Raised;
+use crate::plan::PyPlan;
 use crate::policy::{from_bytes, to_bytes};
 use crate::solve::simulator;
 
@@ -56,7 +56,7 @@ type Answer<'py> = (Bound<'py, PyBytes>, Bound<'py, PyBytes>, Bound<'py, PyBytes
 #[pymethods]
 impl Tasks {
     #[new]
-    fn new(plan: &Plan, options: TaskOptions) -> PyResult<Self> {
+    fn new(plan: &PyPlan, options: TaskOptions) -> PyResult<Self> {
         let scenario = scenario(plan, &options)?;
         let (world, start) = (&scenario.world, scenario.start);
         let states = match options.leg {
@@ -99,26 +99,27 @@ impl Tasks {
     }
 
     /// One action in each slot; those in `begins` (a byte a slot, 1 for yes) begin an episode instead.
-    fn step<'py>(&self, py: Python<'py>, actions: &[u8], begins: &[u8]) -> Result<Answer<'py>, Failure> {
-        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+    fn step<'py>(&self, py: Python<'py>, actions: &[u8], begins: &[u8]) -> Result<Answer<'py>, Raised> {
         let actions = from_bytes(actions);
-        let wanted = slots.len() * PolicyInterface::ACTION_LEN;
-        if actions.len() != wanted || begins.len() != slots.len() {
-            return Err(Failure::new(
-                "USAGE",
-                format!("{} numbers of actions, expected {wanted}", actions.len()),
-            ));
-        }
-        py.detach(|| {
+        let wanted = begins.len() * PolicyInterface::ACTION_LEN;
+        let result = py.detach(|| {
+            let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+            if actions.len() != wanted || begins.len() != slots.len() {
+                return None;
+            }
             let given = actions.par_chunks_exact(PolicyInterface::ACTION_LEN).zip(begins);
-            slots
-                .par_iter_mut()
-                .zip(given)
-                .for_each(|(slot, (action, begins))| slot.step(action, *begins == 1));
+            let each = slots.par_iter_mut().zip(given);
+            each.for_each(|(slot, (action, begins))| slot.step(action, *begins == 1));
+            let observations: Vec<f32> =
+                slots.iter().flat_map(|slot| slot.observation.iter().copied()).collect();
+            let rewards: Vec<f32> = slots.iter().map(|slot| slot.step.reward).collect();
+            let flags: Vec<u8> = slots.iter().map(|slot| flags(&slot.step)).collect();
+            Some((observations, rewards, flags))
         });
-        let observations: Vec<f32> = slots.iter().flat_map(|slot| slot.observation.iter().copied()).collect();
-        let rewards: Vec<f32> = slots.iter().map(|slot| slot.step.reward).collect();
-        let flags: Vec<u8> = slots.iter().map(|slot| flags(&slot.step)).collect();
+        let Some((observations, rewards, flags)) = result else {
+            let message = format!("{} numbers of actions, expected {wanted}", actions.len());
+            return Err(Raised::new("USAGE", message));
+        };
         Ok((to_bytes(py, &observations), to_bytes(py, &rewards), PyBytes::new(py, &flags)))
     }
 }
@@ -143,7 +144,7 @@ const fn is_in_guide(interface: &PolicyInterface) -> bool {
     matches!(interface, PolicyInterface::Guide { .. })
 }
 
-fn scenario(plan: &Plan, options: &TaskOptions) -> Result<Scenario, Failure> {
+fn scenario(plan: &PyPlan, options: &TaskOptions) -> Result<Scenario, Raised> {
     let (solved, world) = (&plan.plan, plan.plan.world.clone());
     let steps = &solved.solution.steps;
     let noise = match &options.noise {
@@ -165,7 +166,7 @@ fn scenario(plan: &Plan, options: &TaskOptions) -> Result<Scenario, Failure> {
         ("guide", _) => prior_interface(&world.robot, PolicyContext::new(&noise, 1.0)),
         (other, _) => {
             let message = format!("observation is {other:?}, expected guide or absolute");
-            return Err(Failure::new("USAGE", message));
+            return Err(Raised::new("USAGE", message));
         }
     };
     let reward: Arc<dyn Reward> = match options.reward.as_str() {
@@ -173,7 +174,7 @@ fn scenario(plan: &Plan, options: &TaskOptions) -> Result<Scenario, Failure> {
         "paper" => Arc::new(PseudoReward::default()),
         other => {
             let message = format!("reward is {other:?}, expected progress or paper");
-            return Err(Failure::new("USAGE", message));
+            return Err(Raised::new("USAGE", message));
         }
     };
     Ok(Scenario {

@@ -18,40 +18,40 @@ pub(crate) fn exception(code: &str, message: impl Display) -> PyErr {
 }
 
 /// Anything that became wrong, with its code.
-pub(crate) struct Failure(PyErr);
+pub(crate) struct Raised(PyErr);
 
-impl From<Failure> for PyErr {
-    fn from(failure: Failure) -> Self {
-        failure.0
+impl From<Raised> for PyErr {
+    fn from(raised: Raised) -> Self {
+        raised.0
     }
 }
 
-impl From<BenchError> for Failure {
+impl From<BenchError> for Raised {
     fn from(error: BenchError) -> Self {
         Self(exception(error.code(), error))
     }
 }
 
-impl From<InputError> for Failure {
+impl From<InputError> for Raised {
     fn from(error: InputError) -> Self {
         Self(exception(error.code(), error))
     }
 }
 
-impl From<MapError> for Failure {
+impl From<MapError> for Raised {
     fn from(error: MapError) -> Self {
         Self(exception(error.code(), error))
     }
 }
 
-impl From<FileError> for Failure {
+impl From<FileError> for Raised {
     fn from(error: FileError) -> Self {
         Self(exception("FILE_INVALID", error))
     }
 }
 
-impl Failure {
-    /// A failure with this code and message.
+impl Raised {
+    /// A raised with this code and message.
     pub(crate) fn new(code: &str, message: impl Display) -> Self {
         Self(exception(code, message))
     }

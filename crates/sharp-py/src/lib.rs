@@ -17,11 +17,11 @@ use pyo3::prelude::*;
 #[pymodule(name = "_core")]
 fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add_class::<map::Map>()?;
-    module.add_class::<map::Robot>()?;
-    module.add_class::<plan::Plan>()?;
-    module.add_class::<policy::Policy>()?;
-    module.add_class::<policy::Driver>()?;
+    module.add_class::<map::PyMap>()?;
+    module.add_class::<map::PyRobot>()?;
+    module.add_class::<plan::PyPlan>()?;
+    module.add_class::<policy::PyPolicy>()?;
+    module.add_class::<policy::PyDriver>()?;
     module.add_class::<environment::Tasks>()?;
     module.add_function(wrap_pyfunction!(solve::solve, module)?)?;
     Ok(())

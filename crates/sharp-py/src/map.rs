@@ -7,7 +7,7 @@ use sharp_maps::{LoadOptions, MapFile, load};
 use sharp_sim::{Drive, RobotModel};
 use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Pose};
 
-use crate::error::Failure;
+use crate::error::Raised;
 
 /// A pose as Python has it: x and y in metres, yaw in radians.
 pub(crate) type Triple = (f64, f64, f64);
@@ -23,13 +23,13 @@ pub(crate) fn triple(pose: &Pose) -> Triple {
 }
 
 /// An occupancy map with its place in the world.
-#[pyclass(frozen, module = "sharp._core")]
-pub(crate) struct Map {
+#[pyclass(frozen, name = "Map", module = "sharp._core")]
+pub(crate) struct PyMap {
     pub(crate) file: MapFile,
 }
 
 #[pymethods]
-impl Map {
+impl PyMap {
     /// Reads the map that `spec` names: a file, or one of the project's own environments.
     #[staticmethod]
     fn load(
@@ -37,7 +37,7 @@ impl Map {
         resolution: Option<f64>,
         unknown_free: bool,
         allow_outside: bool,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, Raised> {
         let options = LoadOptions { resolution_m: resolution, unknown_free, allow_outside };
         Ok(Self { file: load(spec, &options)? })
     }
@@ -46,11 +46,12 @@ impl Map {
     #[staticmethod]
     fn from_cells(
         cells: &[u8],
-        (width, height): (usize, usize),
+        size: (usize, usize),
         resolution: f64,
         origin: Triple,
         name: &str,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, Raised> {
+        let (width, height) = size;
         let frame = GridFrame { origin: pose(origin), resolution_m: resolution, width, height };
         let occupancy = |&cell: &u8| match cell {
             0 => Occupancy::Free,
@@ -58,7 +59,7 @@ impl Map {
             _ => Occupancy::Unknown,
         };
         let grid = OccupancyGrid::new(frame, cells.iter().map(occupancy).collect())
-            .map_err(|error| Failure::new("MAP_INVALID", error))?;
+            .map_err(|error| Raised::new("MAP_INVALID", error))?;
         let file = MapFile { name: name.to_owned(), grid, problems: Vec::new(), warnings: Vec::new() };
         Ok(Self { file })
     }
@@ -108,23 +109,23 @@ impl Map {
 }
 
 /// A robot: its outline, its drive and its limits.
-#[pyclass(frozen, module = "sharp._core")]
-pub(crate) struct Robot {
+#[pyclass(frozen, name = "Robot", module = "sharp._core")]
+pub(crate) struct PyRobot {
     pub(crate) model: RobotModel,
 }
 
 #[pymethods]
-impl Robot {
+impl PyRobot {
     /// The robot called `name`, or described by the file of that name.
     #[staticmethod]
-    fn load(name: &str) -> Result<Self, Failure> {
+    fn load(name: &str) -> Result<Self, Raised> {
         Ok(Self { model: named::robot(name)? })
     }
 
     /// The robot that the text of a robot file describes.
     #[staticmethod]
-    fn from_ron(text: &str) -> Result<Self, Failure> {
-        let model = RobotModel::from_ron(text).map_err(|error| Failure::new("ROBOT_INVALID", error))?;
+    fn from_ron(text: &str) -> Result<Self, Raised> {
+        let model = RobotModel::from_ron(text).map_err(|error| Raised::new("ROBOT_INVALID", error))?;
         Ok(Self { model })
     }
 

@@ -9,12 +9,12 @@ use sharp_bench::{RunReport, Solved, clock_us, named, pictures, to_json};
 use sharp_drive::{EpisodeEnd, OptionPolicy};
 use sharp_export::{PlanNetwork, PlannedPath, RouteGraph, driven_mcap, networks, planned_mcap};
 use sharp_maps::{LoadOptions, load};
-use sharp_plan::{Execution, Moment, Plan as SolvedPlan, Recording, RunSettings, record, write_atomic};
+use sharp_plan::{Execution, Moment, Plan, Recording, RunSettings, record, write_atomic};
 use sharp_space::Seed;
 
-use crate::error::Failure;
-use crate::map::{Robot, Triple, triple};
-use crate::policy::{Driver, Policy};
+use crate::error::Raised;
+use crate::map::{PyRobot, Triple, triple};
+use crate::policy::{PyDriver, PyPolicy};
 use crate::solve::simulator;
 
 /// How plans are driven.
@@ -33,29 +33,29 @@ struct RunOptions {
 type Drive<'py> = (&'static str, Bound<'py, PyBytes>);
 
 /// A solved problem.
-#[pyclass(frozen, module = "sharp._core")]
-pub(crate) struct Plan {
-    pub(crate) plan: Arc<SolvedPlan>,
+#[pyclass(frozen, name = "Plan", module = "sharp._core")]
+pub(crate) struct PyPlan {
+    pub(crate) plan: Arc<Plan>,
     /// All that belongs into its folder; a plan that was read from one has nothing to write.
     pub(crate) solved: Option<Mutex<Solved>>,
 }
 
 #[pymethods]
-impl Plan {
+impl PyPlan {
     /// Reads the plan in `folder`.
     #[staticmethod]
-    fn load(folder: PathBuf) -> Result<Self, Failure> {
+    fn load(folder: PathBuf) -> Result<Self, Raised> {
         let map = folder.join("map.yaml");
         let spec =
-            map.to_str().ok_or_else(|| Failure::new("FILE_INVALID", "the folder's name is not printable"))?;
+            map.to_str().ok_or_else(|| Raised::new("FILE_INVALID", "the folder's name is not printable"))?;
         let grid = load(spec, &LoadOptions::default())?.grid;
-        Ok(Self { plan: Arc::new(SolvedPlan::load(&folder, grid)?), solved: None })
+        Ok(Self { plan: Arc::new(Plan::load(&folder, grid)?), solved: None })
     }
 
     /// Writes plan, map, pictures and report into `folder`, as `sharp solve` does.
-    fn save(&self, py: Python<'_>, folder: PathBuf) -> Result<(), Failure> {
+    fn save(&self, py: Python<'_>, folder: PathBuf) -> Result<(), Raised> {
         let solved = self.solved.as_ref().ok_or_else(|| {
-            Failure::new("USAGE", "this plan was read from a folder; copy that folder instead")
+            Raised::new("USAGE", "this plan was read from a folder; copy that folder instead")
         })?;
         py.detach(|| {
             let mut solved = solved.lock().unwrap_or_else(PoisonError::into_inner);
@@ -64,8 +64,8 @@ impl Plan {
     }
 
     #[getter]
-    fn robot(&self) -> Robot {
-        Robot { model: (*self.plan.world.robot).clone() }
+    fn robot(&self) -> PyRobot {
+        PyRobot { model: (*self.plan.world.robot).clone() }
     }
 
     #[getter]
@@ -97,7 +97,7 @@ impl Plan {
         let mut settings = RunSettings::new(&self.plan, options.episodes, Seed(options.seed));
         settings.simulator = self.plan.world.simulator(simulator(&options.simulator)?);
         if let Some(noise) = &options.noise {
-            settings.noise = named::noise(noise).map_err(Failure::from)?;
+            settings.noise = named::noise(noise).map_err(Raised::from)?;
         }
         settings.recovery = options.recovery;
         settings.contact_ends = options.contact_ends;
@@ -122,62 +122,62 @@ impl Plan {
     /// The plan in another format: one or, for networks, several files.
     fn export<'py>(&self, py: Python<'py>, format: &str) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let plan = &*self.plan;
-        let each = |encode: fn(&PlanNetwork, &SolvedPlan) -> Vec<u8>| {
+        let each = |encode: fn(&PlanNetwork, &Plan) -> Vec<u8>| {
             networks(plan).iter().map(|network| encode(network, plan)).collect()
         };
         let files: Vec<Vec<u8>> = py.detach(|| {
-            Ok::<_, Failure>(match format {
+            Ok::<_, Raised>(match format {
                 "csv" => vec![PlannedPath::new(plan).to_csv(plan).into_bytes()],
                 "json" => vec![PlannedPath::new(plan).to_json(plan).into_bytes()],
-                "mcap" => vec![planned_mcap(plan).map_err(|error| Failure::new("FILE_INVALID", error))?],
+                "mcap" => vec![planned_mcap(plan).map_err(|error| Raised::new("FILE_INVALID", error))?],
                 "geojson" => vec![RouteGraph::of_plan(plan).to_geojson().into_bytes()],
                 "onnx" => each(PlanNetwork::to_onnx),
                 "safetensors" => each(PlanNetwork::to_safetensors),
                 other => {
                     let expected = "csv, json, mcap, geojson, onnx or safetensors";
-                    return Err(Failure::new("USAGE", format!("format is {other:?}, expected {expected}")));
+                    return Err(Raised::new("USAGE", format!("format is {other:?}, expected {expected}")));
                 }
             })
         })?;
         if files.is_empty() {
             return Err(
-                Failure::new("NO_NETWORK", "hand-written followers drive all legs of this plan").into()
+                Raised::new("NO_NETWORK", "hand-written followers drive all legs of this plan").into()
             );
         }
         Ok(files.iter().map(|bytes| PyBytes::new(py, bytes)).collect())
     }
 
     /// The network that drives leg `index`.
-    fn policy(&self, index: usize) -> Result<Policy, Failure> {
+    fn policy(&self, index: usize) -> Result<PyPolicy, Raised> {
         let step = self.step(index)?;
         match &step.learnt.policy {
-            OptionPolicy::Network(network) => Ok(Policy::new(&step.option.id.to_string(), network)),
+            OptionPolicy::Network(network) => Ok(PyPolicy::new(&step.option.id.to_string(), network)),
             other => {
                 let message =
                     format!("leg {index}, {}, is driven by a {} policy", step.option.id, other.kind());
-                Err(Failure::new("NO_NETWORK", message))
+                Err(Raised::new("NO_NETWORK", message))
             }
         }
     }
 
     /// What drives a robot outside along the plan.
-    fn driver(&self, recovery: bool) -> Driver {
-        Driver::new(&self.plan, recovery)
+    fn driver(&self, recovery: bool) -> PyDriver {
+        PyDriver::new(&self.plan, recovery)
     }
 }
 
-impl Plan {
+impl PyPlan {
     /// Leg `index` of the plan.
-    pub(crate) fn step(&self, index: usize) -> Result<&sharp_plan::PlannedOption, Failure> {
+    pub(crate) fn step(&self, index: usize) -> Result<&sharp_plan::PlannedOption, Raised> {
         let steps = &self.plan.solution.steps;
-        steps.get(index).ok_or_else(|| {
-            Failure::new("USAGE", format!("leg is {index}, expected 0 to {}", steps.len() - 1))
-        })
+        steps
+            .get(index)
+            .ok_or_else(|| Raised::new("USAGE", format!("leg is {index}, expected 0 to {}", steps.len() - 1)))
     }
 
-    fn write_recording(&self, file: &Path, recordings: &[Recording]) -> Result<(), Failure> {
+    fn write_recording(&self, file: &Path, recordings: &[Recording]) -> Result<(), Raised> {
         let bytes =
-            driven_mcap(&self.plan, recordings).map_err(|error| Failure::new("FILE_INVALID", error))?;
+            driven_mcap(&self.plan, recordings).map_err(|error| Raised::new("FILE_INVALID", error))?;
         Ok(write_atomic(file, &bytes)?)
     }
 }

@@ -10,25 +10,25 @@ use sharp_rl::{Actor, ActorScratch};
 use sharp_sim::{ActionSettings, RobotState};
 use sharp_space::Vector;
 
-use crate::error::Failure;
+use crate::error::Raised;
 use crate::map::{Triple, pose};
 
 /// A network that drives an option.
-#[pyclass(frozen, module = "sharp._core")]
-pub(crate) struct Policy {
+#[pyclass(frozen, name = "Policy", module = "sharp._core")]
+pub(crate) struct PyPolicy {
     option: String,
     actor: Arc<Actor>,
     interface: PolicyInterface,
 }
 
-impl Policy {
+impl PyPolicy {
     pub(crate) fn new(option: &str, network: &NetworkPolicy) -> Self {
         Self { option: option.to_owned(), actor: Arc::clone(&network.actor), interface: network.interface }
     }
 }
 
 #[pymethods]
-impl Policy {
+impl PyPolicy {
     #[getter]
     fn option(&self) -> &str {
         &self.option
@@ -45,12 +45,12 @@ impl Policy {
     }
 
     /// The actions for observations laid end to end; 32-bit floats as bytes, in and out.
-    fn act<'py>(&self, py: Python<'py>, observations: &[u8]) -> Result<Bound<'py, PyBytes>, Failure> {
+    fn act<'py>(&self, py: Python<'py>, observations: &[u8]) -> Result<Bound<'py, PyBytes>, Raised> {
         let len = self.observation_len();
         let seen = from_bytes(observations);
         if seen.len() % len != 0 {
             let message = format!("{} numbers, expected a multiple of {len}", seen.len());
-            return Err(Failure::new("USAGE", message));
+            return Err(Raised::new("USAGE", message));
         }
         let mut actions = Vec::with_capacity(seen.len() / len * PolicyInterface::ACTION_LEN);
         let mut scratch = ActorScratch::default();
@@ -75,8 +75,8 @@ pub(crate) fn to_bytes<'py>(py: Python<'py>, numbers: &[f32]) -> Bound<'py, PyBy
 }
 
 /// Drives a robot outside: poses in, waypoints out.
-#[pyclass(module = "sharp._core")]
-pub(crate) struct Driver {
+#[pyclass(frozen, name = "Driver", module = "sharp._core")]
+pub(crate) struct PyDriver {
     plan: Arc<Plan>,
     recovery: bool,
     running: Mutex<Option<Running>>,
@@ -92,14 +92,14 @@ struct Running {
 /// Waypoint, speed, option and status.
 type Answer = (Option<(f64, f64)>, f64, String, &'static str);
 
-impl Driver {
+impl PyDriver {
     pub(crate) fn new(plan: &Arc<Plan>, recovery: bool) -> Self {
         Self { plan: Arc::clone(plan), recovery, running: Mutex::new(None) }
     }
 }
 
 #[pymethods]
-impl Driver {
+impl PyDriver {
     /// What a robot at `at` does next. Speed and yaw rate that are not told come from the last two poses.
     fn act(&self, at: Triple, speed: Option<f64>, yaw_rate: Option<f64>) -> Answer {
         let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);

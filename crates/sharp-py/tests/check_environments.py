@@ -7,7 +7,7 @@ from gymnasium.utils.env_checker import check_env
 
 import sharp
 
-plan = sharp.solve(sharp.Map("a"), "limo", problem=2)
+plan = sharp.solve(sharp.Map("a"), "husky", problem=2)
 
 for observation in ("guide", "absolute"):
     for reward in ("progress", "paper"):

@@ -5,7 +5,7 @@ use sharp_bench::{MapReport, SolveTimes, Stopwatch, TimedMonitor, named, picture
 use sharp_drive::World;
 use sharp_export::RouteGraph;
 use sharp_options::{OptionKind, OptionSet};
-use sharp_plan::{Method, write_atomic};
+use sharp_plan::{Abstraction, Method, Monitor, Phase, write_atomic};
 use sharp_sim::NoiseModel;
 use sharp_space::Seed;
 
@@ -25,6 +25,8 @@ struct AbstractReport {
     neighbors: usize,
     options_centroid: usize,
     options_interface: usize,
+    /// Options of the kind asked for that have no guide, and so no edge in the route graph.
+    options_unguided: usize,
     covered: f64,
     components: usize,
     time_s: SolveTimes,
@@ -37,9 +39,12 @@ pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failur
     let spinner = SolveMonitor::new(spinner("building the abstraction"), None);
     let monitor = TimedMonitor::new(stopwatch, None, &spinner);
     let (sharp, file) = prepare(world, &args.abstraction.request(), None, &monitor)?;
-    let (time_s, world) = (monitor.times(), sharp.world());
+    let (world, abstraction) = (sharp.world(), file.abstraction());
+    monitor.phase(Phase::Guide);
+    let graph = route_graph(world, &abstraction, seed);
+    monitor.phase(Phase::Done);
+    let time_s = monitor.times();
     spinner.finish();
-    let abstraction = file.abstraction();
     let count = |kind| OptionSet::synthesize(&file.rbvd, kind, &file.options).options().len();
 
     file.save(&args.out.join("abstraction.ron"))?;
@@ -48,8 +53,6 @@ pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failur
         pictures::write(&args.out, "regions", &pictures::regions(&map.grid, criticality, &regions))?;
     }
     pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
-    let method = Method::default();
-    let graph = RouteGraph::of_options(world, &abstraction, &method, &NoiseModel::nominal(), Seed(seed));
     write_atomic(&args.out.join("route.geojson"), graph.to_geojson().as_bytes())?;
 
     let rbvd = &file.rbvd;
@@ -62,6 +65,7 @@ pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failur
         neighbors: rbvd.states().map(|state| rbvd.neighbors(state).len()).sum::<usize>() / 2,
         options_centroid: count(OptionKind::Centroid),
         options_interface: count(OptionKind::Interface),
+        options_unguided: graph.unguided.len(),
         covered: rbvd.covered_share(),
         components: rbvd.component_count(),
         time_s,
@@ -83,4 +87,9 @@ pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failur
         );
     }
     Ok(Exit::Done)
+}
+
+/// The options with their guides, timed for nominal noise.
+fn route_graph(world: &World, abstraction: &Abstraction, seed: u64) -> RouteGraph {
+    RouteGraph::of_options(world, abstraction, &Method::default(), &NoiseModel::nominal(), Seed(seed))
 }
