@@ -262,11 +262,11 @@ pub(crate) enum Collisions {
 pub(crate) enum ExportFormat {
     /// The path as a table: poses with arc length, time and speed.
     Csv,
-    /// The same as JSON, shaped like a nav_msgs/Path message.
+    /// The same as JSON, shaped like the path message of ROS.
     Json,
     /// Map, path and drive as ROS 2 messages in an MCAP file.
     Mcap,
-    /// Options and path as a route graph for Nav2's Route Server.
+    /// Options and path as a route graph for the Route Server of Nav2.
     Geojson,
     /// Its networks as ONNX models, one file for each different network.
     Onnx,

@@ -1,5 +1,7 @@
 //! What `sharp export` and `sharp run --record` write, read by the official packages of each format.
 
+#![allow(clippy::disallowed_methods, reason = "a variable says whether a test can do more")]
+
 #[path = "common/python.rs"]
 mod python;
 

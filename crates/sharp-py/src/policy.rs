@@ -48,7 +48,7 @@ impl PyPolicy {
     fn act<'py>(&self, py: Python<'py>, observations: &[u8]) -> Result<Bound<'py, PyBytes>, Raised> {
         let len = self.observation_len();
         let seen = from_bytes(observations);
-        if seen.len() % len != 0 {
+        if !seen.len().is_multiple_of(len) {
             let message = format!("{} numbers, expected a multiple of {len}", seen.len());
             return Err(Raised::new("USAGE", message));
         }

@@ -1,5 +1,7 @@
 //! The wheel, installed into an empty virtual environment and used from Python.
 
+#![allow(clippy::disallowed_methods, reason = "a variable says whether a test can do more")]
+
 #[path = "../../sharp-cli/tests/common/python.rs"]
 mod python;
 
