@@ -22,9 +22,11 @@ use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{Cell, OccupancyGrid, Point, Seed};
 
 /// A plan that is solved once for all tests: environment `a`, its second problem, the Husky.
-static PLAN: LazyLock<(tempfile::TempDir, PathBuf)> = LazyLock::new(|| {
-    let folder = tempfile::tempdir().expect("a folder");
-    let plan = folder.path().join("plan");
+static PLAN: LazyLock<(PathBuf, PathBuf)> = LazyLock::new(|| {
+    // Nothing drops what is static, so that it is no temporary folder.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("export");
+    fs::create_dir_all(&folder).expect("a folder");
+    let plan = folder.join("plan");
     let args = ["solve", "a", "--problem", "2", "--library", "none", "--out"];
     let output = sharp(&[&args[..], &[text(&plan)]].concat());
     assert!(output.status.success(), "{output:?}");
@@ -42,7 +44,7 @@ fn text(path: &Path) -> &str {
 /// Exports the plan as `format` and returns the files.
 fn export(format: &str, name: &str) -> Vec<PathBuf> {
     let (folder, plan) = &*PLAN;
-    let out = folder.path().join(name);
+    let out = folder.join(name);
     let output = sharp(&["--json", "export", text(plan), "--format", format, "--out", text(&out)]);
     assert!(output.status.success(), "{format}: {output:?}");
     let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
@@ -90,7 +92,7 @@ fn recordings_decode_topic_by_topic() {
     let (folder, plan_dir) = &*PLAN;
     let planned = export("mcap", "plan.mcap");
     assert_eq!(fs::read(&planned[0]).ok(), fs::read(&export("mcap", "again.mcap")[0]).ok(), "equal bytes");
-    let driven = folder.path().join("drives.mcap");
+    let driven = folder.join("drives.mcap");
     let output = sharp(&["--json", "run", text(plan_dir), "--episodes", "3", "--record", text(&driven)]);
     assert!(output.status.success(), "{output:?}");
     let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
@@ -117,7 +119,7 @@ fn recordings_decode_topic_by_topic() {
 
 #[test]
 fn networks_agree_with_onnxruntime_and_numpy() {
-    let (folder, plan) = (PLAN.0.path(), plan());
+    let (folder, plan) = (&PLAN.0, plan());
     let (models, weights) = (export("onnx", "policy.onnx"), export("safetensors", "policy.safetensors"));
     let ours = networks(&plan);
     assert_eq!((models.len(), weights.len()), (ours.len(), ours.len()), "a file for each network");
@@ -154,7 +156,7 @@ fn networks_agree_with_onnxruntime_and_numpy() {
 #[test]
 fn a_plan_without_a_network_says_who_drives_it() {
     let (folder, plan_dir) = &*PLAN;
-    let copy = folder.path().join("followed");
+    let copy = folder.join("followed");
     fs::create_dir_all(&copy).expect("a folder");
     let mut plan = plan();
     for step in &mut plan.solution.steps {
