@@ -12,7 +12,7 @@ use crate::process::{cargo, exit_code};
 use crate::tree::{self, FOREIGN};
 
 /// Packages that nobody would publish.
-const UNPACKED: [&str; 3] = ["sharp-cli", "sharp-tests", "xtask"];
+const UNPACKED: [&str; 4] = ["sharp-cli", "sharp-py", "sharp-tests", "xtask"];
 
 /// Packs the libraries of a copy below `target/package`; returns cargo's exit code.
 ///

@@ -35,6 +35,8 @@ pub(crate) enum Subcommands {
     Solve(Solve),
     /// Run a solved plan in a simulator and count how often it holds.
     Run(Run),
+    /// Write a plan in a format that others read: tables, MCAP, route graphs, networks.
+    Export(Export),
     /// Drive a robot from outside: poses in, waypoints out, as JSON lines.
     Serve(Serve),
     /// Build the abstraction of a map and draw it.
@@ -233,6 +235,9 @@ pub(crate) struct Run {
     /// What touching a wall means: the end of the episode, or a bump after which it goes on.
     #[arg(long, value_enum, default_value_t = Collisions::End)]
     pub(crate) collisions: Collisions,
+    /// Write all episodes there, one after the other, as ROS 2 messages in an MCAP file, for Foxglove and others.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub(crate) record: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -254,6 +259,35 @@ impl Switch {
 pub(crate) enum Collisions {
     End,
     Contact,
+}
+
+/// A format that others read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExportFormat {
+    /// The path as a table: poses with arc length, time and speed.
+    Csv,
+    /// The same as JSON, shaped like the path message of ROS.
+    Json,
+    /// Map, path and drive as ROS 2 messages in an MCAP file.
+    Mcap,
+    /// Options and path as a route graph for the Route Server of Nav2.
+    Geojson,
+    /// Its networks as ONNX models, one file for each different network.
+    Onnx,
+    /// Its networks as weights, one file for each different network.
+    Safetensors,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Export {
+    /// The folder that `sharp solve` wrote.
+    pub(crate) plan_dir: PathBuf,
+    /// The format.
+    #[arg(long, value_enum)]
+    pub(crate) format: ExportFormat,
+    /// The file to write; where a plan has several networks, those after the first get -2, -3, ... before the ending.
+    #[arg(long, value_name = "PATH")]
+    pub(crate) out: PathBuf,
 }
 
 #[derive(Debug, Args)]

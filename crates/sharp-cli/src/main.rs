@@ -7,7 +7,6 @@
 
 mod args;
 mod commands;
-mod geojson;
 mod input;
 mod outcome;
 mod progress;
@@ -42,8 +41,9 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
     match &cli.command {
         Subcommands::Solve(args) => commands::solve::run(args, cli.seed, cli.json),
         Subcommands::Run(args) => commands::run::run(args, cli.seed, cli.json),
+        Subcommands::Export(args) => commands::export::run(args, cli.json),
         Subcommands::Serve(args) => commands::serve::run(args),
-        Subcommands::Abstract(args) => commands::abstraction::run(args, cli.json),
+        Subcommands::Abstract(args) => commands::abstraction::run(args, cli.seed, cli.json),
         Subcommands::Regions(command) => commands::regions::run(command, cli.seed, cli.json),
         Subcommands::Prior(command) => commands::prior::run(command, cli.seed, cli.json),
         Subcommands::Map(command) => commands::map::run(command, cli.json),

@@ -6,6 +6,7 @@ use serde::Serialize;
 pub(crate) use sharp_bench::to_json;
 use sharp_bench::{BenchError, InputError, ReportError, ResultError};
 use sharp_draw::PngError;
+use sharp_export::RecordError;
 use sharp_maps::MapError;
 use sharp_plan::{FileError, SolveError};
 
@@ -106,6 +107,12 @@ impl From<FileError> for Failure {
 impl From<SolveError> for Failure {
     fn from(error: SolveError) -> Self {
         BenchError::from(error).into()
+    }
+}
+
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        Self::new("FILE_INVALID", error)
     }
 }
 

@@ -66,22 +66,32 @@ pub struct Execution {
 /// Runs `plan`; `clock_us` tells the wall time in microseconds. Executions come in order.
 #[must_use]
 pub fn run(plan: &Arc<Plan>, settings: &RunSettings, clock_us: &(dyn Fn() -> f64 + Sync)) -> Vec<Execution> {
+    let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
+    episodes(plan, settings, |mut episode, mut policy| {
+        let end = episode.drive(&mut policy, &supervisor);
+        Execution { end, record: episode.into_record(), events: policy.events() }
+    })
+}
+
+/// Begins all episodes of `settings`, lets `drive` end each of them, and returns what it made of them, in order.
+pub(crate) fn episodes<T: Send>(
+    plan: &Arc<Plan>,
+    settings: &RunSettings,
+    drive: impl Fn(Episode, ComposedPolicy) -> T + Sync,
+) -> Vec<T> {
     let rules = EpisodeRules::default()
         .with_contact_ends(settings.contact_ends)
         .with_time_limit_s(settings.time_limit_s)
         .with_trace();
     let vehicle = plan.world.vehicle(&*settings.simulator, &settings.noise, settings.contact_ends);
     let episode = Episode::new(vehicle, rules);
-    let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
     let start = RobotState::at_rest(plan.solution.query.start);
-    let execute = |number: u32| {
+    let begin = |number: u32| {
         let mut episode = episode.clone();
         episode.begin(start, settings.seed, u64::from(number));
-        let mut policy = ComposedPolicy::new(Arc::clone(plan), start, settings.recovery);
-        let end = episode.drive(&mut policy, &supervisor);
-        Execution { end, record: episode.into_record(), events: policy.events() }
+        drive(episode, ComposedPolicy::new(Arc::clone(plan), start, settings.recovery))
     };
-    (0..settings.episodes).into_par_iter().map(execute).collect()
+    (0..settings.episodes).into_par_iter().map(begin).collect()
 }
 
 /// Successes among `executions`.

@@ -28,7 +28,7 @@ const fn room(
 }
 
 /// All crates, each after those that it uses.
-const ROOMS: [Room; 16] = [
+const ROOMS: [Room; 18] = [
     room(0, "sharp-space", &[], &[]),
     room(0, "sharp-rl", &[], &[]),
     // Tests drive through generated floor plans.
@@ -63,6 +63,22 @@ const ROOMS: [Room; 16] = [
     ),
     // Pictures of plain data: no edge to the planner, so that whatever has points and poses can be drawn.
     room(5, "sharp-draw", &["sharp-space"], &[]),
+    // Plans and drives in the formats of others.
+    room(
+        5,
+        "sharp-export",
+        &[
+            "sharp-space",
+            "sharp-rbvd",
+            "sharp-sim",
+            "sharp-options",
+            "sharp-guide",
+            "sharp-rl",
+            "sharp-drive",
+            "sharp-plan",
+        ],
+        &[],
+    ),
     // From the names of map, robot, detector and system to a report with figures.
     room(
         5,
@@ -84,6 +100,7 @@ const ROOMS: [Room; 16] = [
         &[],
     ),
     room(6, "sharp-cli", LIBRARIES, LIBRARIES),
+    room(6, "sharp-py", LIBRARIES, LIBRARIES),
     room(6, "sharp-tests", LIBRARIES, LIBRARIES),
     room(6, "xtask", &[], &[]),
 ];
@@ -105,6 +122,7 @@ const LIBRARIES: &[&str] = &[
     "sharp-drive",
     "sharp-plan",
     "sharp-bench",
+    "sharp-export",
     "sharp-draw",
 ];
 

@@ -3,13 +3,16 @@
 use serde::Serialize;
 use sharp_bench::{MapReport, SolveTimes, Stopwatch, TimedMonitor, named, pictures, prepare};
 use sharp_drive::World;
+use sharp_export::RouteGraph;
 use sharp_options::{OptionKind, OptionSet};
-use sharp_plan::write_atomic;
+use sharp_plan::{Abstraction, Method, Monitor, Phase, write_atomic};
+use sharp_sim::NoiseModel;
+use sharp_space::Seed;
 
 use crate::args::Abstract;
+use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{SolveMonitor, spinner};
-use crate::{geojson, input};
 
 /// `sharp.abstract/1`.
 #[derive(Debug, Serialize)]
@@ -22,21 +25,26 @@ struct AbstractReport {
     neighbors: usize,
     options_centroid: usize,
     options_interface: usize,
+    /// Options of the kind asked for that have no guide, and so no edge in the route graph.
+    options_unguided: usize,
     covered: f64,
     components: usize,
     time_s: SolveTimes,
 }
 
-pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
+pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failure> {
     let stopwatch = Stopwatch::start("load");
     let map = input::map(&args.map)?;
     let world = World::new(map.grid.clone(), named::robot(&args.abstraction.robot)?);
     let spinner = SolveMonitor::new(spinner("building the abstraction"), None);
     let monitor = TimedMonitor::new(stopwatch, None, &spinner);
     let (sharp, file) = prepare(world, &args.abstraction.request(), None, &monitor)?;
-    let (time_s, world) = (monitor.times(), sharp.world());
+    let (world, abstraction) = (sharp.world(), file.abstraction());
+    monitor.phase(Phase::Guide);
+    let graph = route_graph(world, &abstraction, seed);
+    monitor.phase(Phase::Done);
+    let time_s = monitor.times();
     spinner.finish();
-    let abstraction = file.abstraction();
     let count = |kind| OptionSet::synthesize(&file.rbvd, kind, &file.options).options().len();
 
     file.save(&args.out.join("abstraction.ron"))?;
@@ -45,8 +53,7 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
         pictures::write(&args.out, "regions", &pictures::regions(&map.grid, criticality, &regions))?;
     }
     pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
-    let route = geojson::route(&abstraction, world.robot.max_speed_mps);
-    write_atomic(&args.out.join("route.geojson"), route.as_bytes())?;
+    write_atomic(&args.out.join("route.geojson"), graph.to_geojson().as_bytes())?;
 
     let rbvd = &file.rbvd;
     let report = AbstractReport {
@@ -58,6 +65,7 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
         neighbors: rbvd.states().map(|state| rbvd.neighbors(state).len()).sum::<usize>() / 2,
         options_centroid: count(OptionKind::Centroid),
         options_interface: count(OptionKind::Interface),
+        options_unguided: graph.unguided.len(),
         covered: rbvd.covered_share(),
         components: rbvd.component_count(),
         time_s,
@@ -79,4 +87,9 @@ pub(crate) fn run(args: &Abstract, json: bool) -> Result<Exit, Failure> {
         );
     }
     Ok(Exit::Done)
+}
+
+/// The options with their guides, timed for nominal noise.
+fn route_graph(world: &World, abstraction: &Abstraction, seed: u64) -> RouteGraph {
+    RouteGraph::of_options(world, abstraction, &Method::default(), &NoiseModel::nominal(), Seed(seed))
 }

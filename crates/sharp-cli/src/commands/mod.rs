@@ -3,6 +3,7 @@
 pub(crate) mod abstraction;
 pub(crate) mod baseline;
 pub(crate) mod eval;
+pub(crate) mod export;
 pub(crate) mod jobs;
 pub(crate) mod library;
 pub(crate) mod map;

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use sharp_bench::{RunReport, clock_us, named, pictures};
+use sharp_export::driven_mcap;
 use sharp_maps::{LoadOptions, load};
-use sharp_plan::{Plan, RunSettings, run as run_plan, write_atomic};
+use sharp_plan::{Execution, Plan, RunSettings, record, run as run_plan, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{Collisions, Run, Switch};
@@ -24,7 +25,10 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     settings.contact_ends = args.collisions == Collisions::End;
 
     let spinner = progress::spinner("driving");
-    let episodes = run_plan(&plan, &settings, &clock_us());
+    let episodes = match &args.record {
+        Some(file) => recorded(&plan, &settings, file)?,
+        None => run_plan(&plan, &settings, &clock_us()),
+    };
     spinner.finish_and_clear();
     let report = RunReport::new(&plan, &episodes);
     let picture = pictures::plan(&plan, &plan.solution.query, &episodes);
@@ -55,6 +59,13 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
         );
     }
     Ok(Exit::Done)
+}
+
+/// Runs `plan` and writes what was driven to `file`.
+fn recorded(plan: &Arc<Plan>, settings: &RunSettings, file: &Path) -> Result<Vec<Execution>, Failure> {
+    let recordings = record(plan, settings, &clock_us());
+    write_atomic(file, &driven_mcap(plan, &recordings)?)?;
+    Ok(recordings.into_iter().map(|recording| recording.execution).collect())
 }
 
 /// Reads the plan in `folder` with its map.

@@ -1,0 +1,156 @@
+//! Networks, and driving a robot outside.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use sharp_drive::{Command, Controller, Decision, Motion, NetworkPolicy, PolicyInterface};
+use sharp_plan::{ComposedPolicy, Plan};
+use sharp_rl::{Actor, ActorScratch};
+use sharp_sim::{ActionSettings, RobotState};
+use sharp_space::Vector;
+
+use crate::error::Raised;
+use crate::map::{Triple, pose};
+
+/// A network that drives an option.
+#[pyclass(frozen, name = "Policy", module = "sharp._core")]
+pub(crate) struct PyPolicy {
+    option: String,
+    actor: Arc<Actor>,
+    interface: PolicyInterface,
+}
+
+impl PyPolicy {
+    pub(crate) fn new(option: &str, network: &NetworkPolicy) -> Self {
+        Self { option: option.to_owned(), actor: Arc::clone(&network.actor), interface: network.interface }
+    }
+}
+
+#[pymethods]
+impl PyPolicy {
+    #[getter]
+    fn option(&self) -> &str {
+        &self.option
+    }
+
+    #[getter]
+    fn observation_len(&self) -> usize {
+        self.interface.observation_len()
+    }
+
+    #[getter]
+    fn action_len(&self) -> usize {
+        PolicyInterface::ACTION_LEN
+    }
+
+    /// The actions for observations laid end to end; 32-bit floats as bytes, in and out.
+    fn act<'py>(&self, py: Python<'py>, observations: &[u8]) -> Result<Bound<'py, PyBytes>, Raised> {
+        let len = self.observation_len();
+        let seen = from_bytes(observations);
+        if !seen.len().is_multiple_of(len) {
+            let message = format!("{} numbers, expected a multiple of {len}", seen.len());
+            return Err(Raised::new("USAGE", message));
+        }
+        let mut actions = Vec::with_capacity(seen.len() / len * PolicyInterface::ACTION_LEN);
+        let mut scratch = ActorScratch::default();
+        for observation in seen.chunks_exact(len) {
+            let mut action = [0.0; PolicyInterface::ACTION_LEN];
+            self.actor.act_mean(observation, &mut scratch, &mut action);
+            actions.extend(action);
+        }
+        Ok(to_bytes(py, &actions))
+    }
+}
+
+/// 32-bit floats of bytes.
+pub(crate) fn from_bytes(bytes: &[u8]) -> Vec<f32> {
+    let (words, _) = bytes.as_chunks::<4>();
+    words.iter().map(|word| f32::from_le_bytes(*word)).collect()
+}
+
+/// 32-bit floats as bytes.
+pub(crate) fn to_bytes<'py>(py: Python<'py>, numbers: &[f32]) -> Bound<'py, PyBytes> {
+    PyBytes::new(py, &numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>())
+}
+
+/// Drives a robot outside: poses in, waypoints out.
+#[pyclass(frozen, name = "Driver", module = "sharp._core")]
+pub(crate) struct PyDriver {
+    plan: Arc<Plan>,
+    recovery: bool,
+    running: Mutex<Option<Running>>,
+}
+
+struct Running {
+    policy: ComposedPolicy,
+    state: RobotState,
+    /// The last answer, until its outcome is known.
+    pending: Option<Command>,
+}
+
+/// Waypoint, speed, option and status.
+type Answer = (Option<(f64, f64)>, f64, String, &'static str);
+
+impl PyDriver {
+    pub(crate) fn new(plan: &Arc<Plan>, recovery: bool) -> Self {
+        Self { plan: Arc::clone(plan), recovery, running: Mutex::new(None) }
+    }
+}
+
+#[pymethods]
+impl PyDriver {
+    /// What a robot at `at` does next. Speed and yaw rate that are not told come from the last two poses.
+    fn act(&self, at: Triple, speed: Option<f64>, yaw_rate: Option<f64>) -> Answer {
+        let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
+        let state = state(at, speed, yaw_rate, running.as_ref().map(|running| &running.state));
+        let running = running.get_or_insert_with(|| Running {
+            policy: ComposedPolicy::new(Arc::clone(&self.plan), state, self.recovery),
+            state,
+            pending: None,
+        });
+        running.answer(state)
+    }
+}
+
+/// The robot's state; motion that was not told is taken from the last two poses, one action apart.
+fn state(at: Triple, speed: Option<f64>, yaw_rate: Option<f64>, before: Option<&RobotState>) -> RobotState {
+    let pose = pose(at);
+    let mut state = RobotState::at_rest(pose);
+    let action_s = ActionSettings::default().action_s;
+    if let Some(before) = before {
+        state.velocity = before.pose.to_local(pose.position) / action_s;
+        state.yaw_rate_radps = before.pose.heading.turn_to(pose.heading) / action_s;
+        state.steer_rad = before.steer_rad;
+    }
+    if let Some(speed) = speed {
+        state.velocity = Vector::new(speed, 0.0);
+    }
+    state.yaw_rate_radps = yaw_rate.unwrap_or(state.yaw_rate_radps);
+    state
+}
+
+impl Running {
+    fn answer(&mut self, state: RobotState) -> Answer {
+        if let Some(command) = self.pending.take() {
+            self.policy.observe(&Motion::commanded(command, state));
+        }
+        self.state = state;
+        let decision = self.policy.decide();
+        let (command, status) = match decision {
+            Decision::Drive(command) if self.policy.is_recovering() => (Some(command), "recovering"),
+            Decision::Drive(command) => (Some(command), "running"),
+            // Nobody tells this robot of contacts, so it is never asked to back off.
+            Decision::BackOff => (None, "recovering"),
+            Decision::Reached => (None, "reached"),
+            Decision::Lost => (None, "lost"),
+        };
+        self.pending = command;
+        let waypoint = command.map(|command| {
+            let point = command.to_world(&state.pose);
+            (point.x, point.y)
+        });
+        let speed = command.map_or(0.0, |command| command.speed_mps);
+        (waypoint, speed, self.policy.option().id.to_string(), status)
+    }
+}

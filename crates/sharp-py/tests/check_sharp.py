@@ -1,0 +1,124 @@
+"""The package `sharp`, from a map to a driven plan. Prints "all checks passed" at the end."""
+
+import pathlib
+import pickle
+import tempfile
+import threading
+import time
+
+import numpy as np
+
+import sharp
+
+
+def raises(code, call):
+    try:
+        call()
+    except sharp.SharpError as error:
+        assert error.code == code, (error.code, str(error))
+        assert str(pickle.loads(pickle.dumps(error))) == str(error)
+        return error
+    raise AssertionError(f"expected {code}")
+
+
+# Two rooms and a door of 1.4 m.
+cells = np.zeros((62, 122), np.int8)
+cells[[0, -1], :] = cells[:, [0, -1]] = 100
+cells[:, 60:62] = 100
+cells[24:38, 60:62] = 0
+
+rooms = sharp.Map(cells, resolution=0.1, name="rooms")
+assert (rooms.cells == cells).all() and rooms.resolution == 0.1 and rooms.origin == (0.0, 0.0, 0.0)
+assert sharp.Map("a").cells.shape == (300, 300) and len(sharp.Map("a").problems) == 5
+raises("MAP_INVALID", lambda: sharp.Map(cells))
+raises("MAP_INVALID", lambda: sharp.Map(cells + 7, resolution=0.1))
+raises("MAP_INVALID", lambda: sharp.Map(cells.astype(float), resolution=0.1))
+assert sharp.Map("missing.yaml") if False else raises("MAP_UNREADABLE", lambda: sharp.Map("missing.yaml")) or True
+
+limo = sharp.Robot("limo")
+assert limo.name == "limo" and 0.3 < limo.outline[0] < 0.35 and limo.turning_radius > 0.3
+assert sharp.Robot("husky").turning_radius == 0.0
+raises("FILE_UNREADABLE", lambda: sharp.Robot("tank"))
+
+across = {"start": (2.0, 3.0, 0.0), "goal": (10.0, 3.5), "regions": "geometric"}
+error = raises("GOAL_OCCUPIED", lambda: sharp.solve(rooms, limo, start=(2, 3, 0), goal=(6.05, 1)))
+assert error.nav2 == 206
+raises("POSE_INVALID", lambda: sharp.solve(rooms, limo, start=(2, 3), goal=(10, 3)))
+raises("USAGE", lambda: sharp.solve(rooms, limo))
+raises("USAGE", lambda: sharp.solve(rooms, limo, **across, learning="slow"))
+
+# Solving tells of its progress, and other threads go on meanwhile.
+phases, ticks, done = [], [0], threading.Event()
+
+
+def tick():
+    while not done.is_set():
+        ticks[0] += 1
+        time.sleep(0.005)
+
+
+thread = threading.Thread(target=tick)
+thread.start()
+plan = sharp.solve(rooms, limo, **across, progress=lambda phase, _: phases.append(phase))
+done.set()
+thread.join()
+assert ticks[0] > 5, f"the lock was released: {ticks[0]} ticks"
+assert {"regions", "abstraction", "search", "verify"} <= set(phases), phases
+assert plan.report["status"] == "solved" and plan.predicted["success"] > 0.9, plan.report
+
+
+def stop(phase, _):
+    raise KeyError(phase)
+
+
+try:
+    sharp.solve(rooms, limo, **across, progress=stop)
+    raise AssertionError("what the callback raises ends the solve")
+except KeyError:
+    pass
+
+# Where there is no way, the exception says why.
+closed = cells.copy()
+closed[:, 60:62] = 100
+error = raises("NO_VALID_PATH", lambda: sharp.solve(sharp.Map(closed, resolution=0.1), limo, **across))
+assert isinstance(error, sharp.NoPlanError) and error.report["status"] == "no_plan" and str(error)
+
+path = plan.path()
+assert path.shape[1] == 7 and (np.diff(path[:, 4]) > 0).all(), "time goes on"
+assert abs(path[-1, 4] - plan.predicted["sim_time_s"]) < 1e-6
+assert len(plan.message()["poses"]) == len(path)
+
+run = plan.run(episodes=10, seed=3)
+assert len(run.drives) == 10 and run.success_rate == np.mean([drive.success for drive in run.drives])
+again = plan.run(episodes=10, seed=3)
+assert all((a.samples == b.samples).all() for a, b in zip(run.drives, again.drives)), "equal seeds, equal drives"
+assert run.success_rate >= 0.9, run.report
+
+with tempfile.TemporaryDirectory() as name:
+    folder = pathlib.Path(name)
+    plan.save(folder / "plan")
+    read = sharp.Plan.load(folder / "plan")
+    assert read.predicted == plan.predicted and (read.path() == path).all()
+    assert (read.run(episodes=2).drives[0].samples == plan.run(episodes=2).drives[0].samples).all()
+    for format in ("csv", "json", "mcap", "geojson", "onnx", "safetensors"):
+        for file in plan.export(format, folder / f"plan.{format}"):
+            assert pathlib.Path(file).stat().st_size > 100, file
+    plan.run(episodes=1, record=folder / "drive.mcap")
+    assert (folder / "drive.mcap").read_bytes().startswith(b"\x89MCAP")
+    raises("USAGE", lambda: plan.export("parquet", folder / "x"))
+
+# A policy is a function of arrays; a driver is asked pose by pose.
+legs = [leg for leg, told in enumerate(plan.legs) if told["policy"] == "learnt"]
+policy = plan.policy(legs[0])
+many = np.random.default_rng(1).uniform(-1, 1, (5, policy.observation_len))
+assert policy.act(many).shape == (5, 2) and np.allclose(policy.act(many)[3], policy.act(many[3]))
+assert np.abs(policy.act(many)).max() <= 1.0
+raises("USAGE", lambda: policy.act(many[:, 1:]))
+raises("USAGE", lambda: plan.policy(99))
+driver = plan.driver()
+waypoint = driver.act(plan.start)
+assert waypoint.status == "running" and waypoint.speed > 0 and len(waypoint.position) == 2
+assert plan.driver().act((*plan.goal[:2], 0.0)).option
+
+print(plan)
+print("all checks passed")
