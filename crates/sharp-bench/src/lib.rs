@@ -41,6 +41,7 @@ mod measure;
 mod prior;
 mod reports;
 mod result;
+mod robot_import;
 mod solve;
 mod stopwatch;
 mod tensorboard;
@@ -69,6 +70,7 @@ pub use reports::{
 pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
 };
+pub use robot_import::{Finding, ImportError, ImportWishes, ImportedRobot, import_robot};
 pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
 pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
 pub use tensorboard::EventFile;

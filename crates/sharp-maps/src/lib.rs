@@ -26,5 +26,7 @@ mod generate;
 mod formats;
 
 #[cfg(feature = "files")]
-pub use formats::{Door, LoadOptions, MapError, MapFile, Problem, load, load_doors, named_maps, save_ros};
+pub use formats::{
+    Door, LoadOptions, MapError, MapFile, Problem, Scenario, load, load_doors, load_scenario, named_maps, save_ros,
+};
 pub use generate::{FloorplanKind, generate, turned_from};

@@ -19,7 +19,7 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
         return Err(Failure::new("USAGE", message));
     }
     let map = input::map(&args.map)?;
-    let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
+    let query = input::query(&map, &args.problem)?;
     let problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
     let settings = SolveSettings {
         abstraction: args.abstraction.request(),
@@ -72,7 +72,7 @@ fn plan_folder(args: &Solve, problem: &NamedProblem) -> Result<PathBuf, Failure>
     if let Some(folder) = &args.out {
         return Ok(folder.clone());
     }
-    let number = args.problem.map_or(String::new(), |number| format!("-p{number}"));
+    let number = args.problem.problem.map_or(String::new(), |number| format!("-p{number}"));
     let kind = sharp_options::OptionKind::from(args.abstraction.options).name();
     let stem = format!("{}{number}-{}-{kind}", problem.map, problem.world.robot.name);
     let root = Path::new("sharp-plans");
