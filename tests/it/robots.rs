@@ -23,10 +23,8 @@ const TRACTOR: &[(f64, f64)] = &[(0.55, 0.0), (0.4, 0.25), (-0.12, 0.25), (-0.12
 
 fn tractor() -> (RobotModel, Outline) {
     let corners: Vec<String> = TRACTOR.iter().rev().map(|(x, y)| format!("[{x}, {y}]")).collect();
-    let text = format!(
-        "(footprint: \"[{}]\", drive: Differential(), max_speed_mps: 0.8)",
-        corners.join(", ")
-    );
+    let text =
+        format!("(footprint: \"[{}]\", drive: Differential(), max_speed_mps: 0.8)", corners.join(", "));
     (RobotModel::from_ron_named(&text, "tractor").expect("a robot"), Outline::Corners(TRACTOR))
 }
 
@@ -46,7 +44,8 @@ fn overlap_m(outline: &Outline, pose: Pose, (x, y): (f64, f64), side_m: f64) -> 
         Outline::Corners(corners) => {
             let robot: Vec<(f64, f64)> =
                 corners.iter().map(|(a, b)| (px + cos * a - sin * b, py + sin * a + cos * b)).collect();
-            let cell = [(x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half)];
+            let cell =
+                [(x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half)];
             let normals = |of: &[(f64, f64)]| -> Vec<(f64, f64)> {
                 let next = of.iter().cycle().skip(1);
                 of.iter().zip(next).map(|(a, b)| (b.1 - a.1, a.0 - b.0)).collect()

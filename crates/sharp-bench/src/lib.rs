@@ -46,6 +46,7 @@ mod solve;
 mod stopwatch;
 mod tensorboard;
 mod times;
+mod tour;
 
 pub use baselines::{FlatSac, Mpc, RoutePlanner, Rrt, SacBudget, Track};
 pub use contender::{ComparisonSettings, Composed, Contender, Driven, compare};
@@ -65,7 +66,8 @@ pub use prior::{
     prior_candidates, score_policies, train_prior,
 };
 pub use reports::{
-    BaselineReport, BaselineTimes, MapReport, OptionReport, Predicted, RunReport, SolveReport, Verified,
+    BaselineReport, BaselineTimes, GoalReport, MapReport, OptionReport, Predicted, RunReport, SolveReport,
+    Verified,
 };
 pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
@@ -75,3 +77,4 @@ pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
 pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
 pub use tensorboard::EventFile;
 pub use times::{DecisionTimes, Reuse, SolveTimes};
+pub use tour::{SolvedTour, solve_tour};

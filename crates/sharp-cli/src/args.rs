@@ -177,6 +177,12 @@ pub(crate) struct Solve {
     pub(crate) abstraction: AbstractionArgs,
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
+    /// Drive there first, before the goal; may be repeated, in this order.
+    #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true)]
+    pub(crate) via: Vec<String>,
+    /// Exit with 1 if the plan predicts less success than this; it is written all the same.
+    #[arg(long, value_name = "P", default_value_t = 0.0)]
+    pub(crate) min_success: f64,
     /// How policies are learnt.
     #[arg(long, value_enum, default_value_t = Learning::Fast)]
     pub(crate) learning: Learning,
@@ -201,7 +207,7 @@ pub(crate) struct Solve {
     /// Where the plan is written [default: a fresh folder under ./sharp-plans].
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Stop after so many seconds of wall time; what was learnt is kept.
+    /// Stop after so many seconds of wall time, with the best plan so far; what was learnt is kept.
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
     /// Write learning curves for TensorBoard there, one run a leg that is trained [default: none].

@@ -32,7 +32,7 @@ pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
         map.downsample(args.downsample as usize)?;
         let frame = map.grid.frame();
         map.warnings.push(format!(
-            "cells are {} x {} of the map's now, {} m: passages of less than two cells may be gone",
+            "cells are {} x {} of the map's now, {:.3} m: passages of less than two cells may be gone",
             args.downsample, args.downsample, frame.resolution_m
         ));
     }
@@ -159,7 +159,8 @@ fn towards(start: Point, goal: Point) -> Query {
 fn at_pixel(map: &MapFile, flag: &str, text: &str) -> Result<(Pose, bool), Failure> {
     let (width, height) = (map.picture.width, map.picture.height);
     let broken = || {
-        let expected = format!("a column below {width} and a row below {height}, counted from the upper left: C,R");
+        let expected =
+            format!("a column below {width} and a row below {height}, counted from the upper left: C,R");
         Failure::new("POSE_INVALID", format!("{flag} is {text:?}, expected {expected}"))
     };
     let parts: Vec<&str> = text.split(',').map(str::trim).collect();

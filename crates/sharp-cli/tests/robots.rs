@@ -7,7 +7,11 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 fn sharp(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sharp")).args(args).current_dir(folder).output().expect("the binary runs")
+    Command::new(env!("CARGO_BIN_EXE_sharp"))
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .expect("the binary runs")
 }
 
 fn json(output: &Output) -> Value {
@@ -54,15 +58,22 @@ fn a_robot_is_imported_shown_and_used() {
 fn built_in_robots_are_listed_and_known_in_any_case() {
     let folder = tempfile::tempdir().expect("a folder");
     let list = json(&sharp(folder.path(), &["robot", "list", "--json"]));
-    let names: Vec<&str> =
-        list["robots"].as_array().expect("a list").iter().filter_map(|robot| robot["name"].as_str()).collect();
+    let names: Vec<&str> = list["robots"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|robot| robot["name"].as_str())
+        .collect();
     assert_eq!(names, ["husky", "limo", "turtlebot3", "jackal", "car"]);
     for name in ["Husky", "TURTLEBOT3"] {
         let check = json(&sharp(folder.path(), &["map", "check", "a", "--robot", name, "--json"]));
         assert_eq!(check["robot"], name.to_lowercase(), "{check}");
     }
     let unknown = sharp(folder.path(), &["robot", "show", "tank", "--json"]);
-    assert_eq!((unknown.status.code(), &json(&unknown)["error"]["code"]), (Some(2), &"FILE_UNREADABLE".into()));
+    assert_eq!(
+        (unknown.status.code(), &json(&unknown)["error"]["code"]),
+        (Some(2), &"FILE_UNREADABLE".into())
+    );
 }
 
 #[test]

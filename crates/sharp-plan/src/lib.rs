@@ -46,6 +46,7 @@ mod reason;
 mod repair;
 mod search;
 mod sharp;
+mod tour;
 mod training_route;
 mod verify;
 
@@ -70,5 +71,6 @@ pub use problem::PlanningProblem;
 pub use query::{Monitor, Phase, Query, QueryError};
 pub use search::{Search, Unplaced};
 pub use sharp::{Answer, Sharp, SolveError};
+pub use tour::{Tour, TourPolicy, end_of};
 pub use training_route::{RouteScenarios, TrainingRoute, training_routes};
 pub use verify::{PlannedOption, Solution};

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use sharp_space::{CollisionChecker, Footprint, FootprintChecker, FootprintShape, GridFrame, Occupancy, OccupancyGrid, Pose};
+use sharp_space::{
+    CollisionChecker, Footprint, FootprintChecker, FootprintShape, GridFrame, Occupancy, OccupancyGrid, Pose,
+};
 use thiserror::Error;
 
 use crate::obstacle_map::ObstacleMap;

@@ -193,7 +193,10 @@ mod tests {
         assert_eq!(robot.footprint, Footprint::disc(0.2).expect("a disc"));
         assert_eq!(robot.drive, Drive::Differential { track_m: 0.3, wheelbase_m: 0.0 });
         assert_eq!((robot.yaw_gain(), robot.min_speed_mps, robot.goal_tolerance_m), (1.0, 0.0, 0.3));
-        assert_eq!((robot.max_accel_mps2, robot.max_yaw_rate_radps, robot.name.as_str()), (1.5, 2.0, "robot"));
+        assert_eq!(
+            (robot.max_accel_mps2, robot.max_yaw_rate_radps, robot.name.as_str()),
+            (1.5, 2.0, "robot")
+        );
         let car = RobotModel::from_ron(
             "RobotModel(footprint: \"[[1.4,0.4],[-0.3,0.4],[-0.3,-0.4],[1.4,-0.4]]\", \
              drive: Ackermann(wheelbase_m: 1.0, max_steer_rad: 0.5), max_speed_mps: 2.0)",
@@ -224,7 +227,10 @@ mod tests {
     fn what_is_missing_or_told_twice_is_named() {
         let drive = "drive: Differential(), max_speed_mps: 1.0";
         for (text, message) in [
-            (format!("({drive})"), "robot \"robot\": has neither of them, must have footprint or robot_radius"),
+            (
+                format!("({drive})"),
+                "robot \"robot\": has neither of them, must have footprint or robot_radius",
+            ),
             (
                 format!("(robot_radius: 0.1, footprint: (radius_m: 0.1), {drive})"),
                 "robot \"robot\": has both of them",

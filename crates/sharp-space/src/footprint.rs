@@ -31,7 +31,9 @@ pub enum FootprintError {
         value: f64,
     },
     /// A corner is not a place near the robot.
-    #[error("footprint corner {index} is ({x}, {y}), must be finite and at most 20 m from the reference point")]
+    #[error(
+        "footprint corner {index} is ({x}, {y}), must be finite and at most 20 m from the reference point"
+    )]
     Corner {
         /// Its number, from 1.
         index: usize,
@@ -53,7 +55,9 @@ pub enum FootprintError {
     )]
     ReferenceOutside,
     /// A text that is not Nav2's list of corners.
-    #[error("footprint is {text:?}, must be a list of corners such as \"[[0.2, 0.1], [-0.2, 0.1], [0.0, -0.1]]\"")]
+    #[error(
+        "footprint is {text:?}, must be a list of corners such as \"[[0.2, 0.1], [-0.2, 0.1], [0.0, -0.1]]\""
+    )]
     Text {
         /// The text, cut where it is long.
         text: String,
@@ -263,7 +267,8 @@ impl Footprint {
             }
             Shape::Disc { radius_m } => (0..DISC_CORNERS)
                 .map(|index| {
-                    let (sin, cos) = trig::sin_cos(std::f64::consts::TAU * index as f64 / DISC_CORNERS as f64);
+                    let (sin, cos) =
+                        trig::sin_cos(std::f64::consts::TAU * index as f64 / DISC_CORNERS as f64);
                     pose.to_world(Vector::new(cos, sin) * *radius_m)
                 })
                 .collect(),

@@ -60,7 +60,8 @@ impl Facts {
         let source = source.into();
         match &self.footprint {
             Some(known) if known.value != footprint => {
-                self.warnings.push(format!("{source} is another footprint than {}, which counts", known.source));
+                self.warnings
+                    .push(format!("{source} is another footprint than {}, which counts", known.source));
             }
             Some(_) => {}
             None => self.footprint = Some(Fact { value: footprint, source }),

@@ -61,7 +61,12 @@ const KEYS: [(Quantity, &[&str]); 9] = [
     (Quantity::MaxSteer, &["max_steering_angle", "max_steer_angle"]),
     (
         Quantity::TurningRadius,
-        &["AckermannConstraints.min_turning_r", "min_turning_r", "minimum_turning_radius", "min_turning_radius"],
+        &[
+            "AckermannConstraints.min_turning_r",
+            "min_turning_r",
+            "minimum_turning_radius",
+            "min_turning_radius",
+        ],
     ),
 ];
 
@@ -123,13 +128,17 @@ fn footprint(entries: &[Entry<'_>], facts: &mut Facts) -> Result<bool, String> {
     let mut outlines: Vec<(String, Footprint)> = outlines
         .map(|(path, value)| {
             let outline = Footprint::from_nav2(&value.text());
-            outline.map(|outline| (path.join("."), outline)).map_err(|error| format!("{}: {error}", path.join(".")))
+            outline
+                .map(|outline| (path.join("."), outline))
+                .map_err(|error| format!("{}: {error}", path.join(".")))
         })
         .collect::<Result<_, _>>()?;
     for (path, value) in in_costmaps(entries, "robot_radius") {
         let source = path.join(".");
-        let radius_m = value.number().ok_or_else(|| format!("{source} is {:?}, must be metres", value.text()))?;
-        outlines.push((source.clone(), Footprint::disc(radius_m).map_err(|error| format!("{source}: {error}"))?));
+        let radius_m =
+            value.number().ok_or_else(|| format!("{source} is {:?}, must be metres", value.text()))?;
+        outlines
+            .push((source.clone(), Footprint::disc(radius_m).map_err(|error| format!("{source}: {error}"))?));
     }
     let Some((source, outline)) = outlines.first().cloned() else { return Ok(false) };
     let padding = in_costmaps(entries, "footprint_padding").next();
@@ -169,7 +178,9 @@ fn drive(entries: &[Entry<'_>], facts: &mut Facts) {
                 "diffdrive" | "diff" => says(false, facts),
                 "omni" => {
                     says(false, facts);
-                    facts.warnings.push(format!("{source} is Omni: here the robot only turns and drives ahead"));
+                    facts
+                        .warnings
+                        .push(format!("{source} is Omni: here the robot only turns and drives ahead"));
                 }
                 _ => {}
             }
@@ -186,7 +197,8 @@ fn drive(entries: &[Entry<'_>], facts: &mut Facts) {
             says(true, facts);
         }
     }
-    let of_car = |path: &[&str]| ends_in(path, "minimum_turning_radius") || ends_in(path, "min_turning_radius");
+    let of_car =
+        |path: &[&str]| ends_in(path, "minimum_turning_radius") || ends_in(path, "min_turning_radius");
     let radius = entries.iter().find(|(path, value)| of_car(path) && value.number().is_some_and(|r| r > 0.0));
     if let Some((path, _)) = radius {
         facts.say_drive(true, format!("{}, and nothing that turns in place", path.join(".")));

@@ -10,7 +10,11 @@ fn import(files: &[(&str, &str)], wishes: &ImportWishes) -> Result<ImportedRobot
     }
     let imported = import_robot(&paths, wishes)?;
     let again = RobotModel::from_ron(&imported.text).unwrap_or_else(|e| panic!("{e} in\n{}", imported.text));
-    assert_eq!(again.footprint, imported.robot.footprint, "what is written is what was made\n{}", imported.text);
+    assert_eq!(
+        again.footprint, imported.robot.footprint,
+        "what is written is what was made\n{}",
+        imported.text
+    );
     assert_eq!(again.drive, imported.robot.drive, "{}", imported.text);
     Ok(imported)
 }
@@ -82,10 +86,15 @@ fn parameters_of_a_round_robot_with_a_dynamic_window_make_one_that_turns_in_plac
     let robot = &imported.robot;
     assert_eq!(robot.footprint, sharp_space::Footprint::disc(0.22).unwrap(), "the local costmap counts");
     assert!(robot.can_turn_in_place() && robot.name == "round", "{}", imported.text);
-    let limits = [robot.max_speed_mps, robot.max_yaw_rate_radps, robot.max_accel_mps2, robot.max_yaw_accel_radps2];
+    let limits =
+        [robot.max_speed_mps, robot.max_yaw_rate_radps, robot.max_accel_mps2, robot.max_yaw_accel_radps2];
     assert_eq!(limits, [0.26, 1.0, 2.5, 3.2]);
     assert_eq!(robot.goal_tolerance_m, 0.25);
-    assert!(imported.warnings.iter().any(|warning| warning.contains("another footprint")), "{:?}", imported.warnings);
+    assert!(
+        imported.warnings.iter().any(|warning| warning.contains("another footprint")),
+        "{:?}",
+        imported.warnings
+    );
     assert!(imported.assumed.iter().any(|field| field.field == "mass_kg"), "the file knows no mass");
     assert!(imported.text.contains("max_speed_mps: 0.26, // controller_server."), "{}", imported.text);
 }
@@ -105,7 +114,8 @@ fn parameters_of_a_car_give_its_turning_radius() {
 
 #[test]
 fn lists_of_ros_one_and_two_files_of_one_robot_are_read_as_well() {
-    let costmap = "footprint: [[-0.5, -0.33], [-0.5, 0.33], [0.5, 0.33], [0.5, -0.33]]\nfootprint_padding: 0.01\n";
+    let costmap =
+        "footprint: [[-0.5, -0.33], [-0.5, 0.33], [0.5, 0.33], [0.5, -0.33]]\nfootprint_padding: 0.01\n";
     let planner = "DWAPlannerROS:\n  max_vel_x: 0.5\n  max_vel_rot: 1.0\n  acc_lim_x: 2.5\n";
     let robot = plain(&[("costmap.yaml", costmap), ("planner.yaml", planner)]).robot;
     assert_eq!(robot.footprint, sharp_space::Footprint::rectangle(0.51, 0.34).unwrap());
@@ -121,7 +131,8 @@ fn a_robot_description_gives_outline_wheels_and_speed() {
     let sharp_space::FootprintShape::Polygon { corners } = robot.footprint.shape() else {
         panic!("the axle is not in the middle: {:?}", robot.footprint)
     };
-    let reach = |of: fn(&sharp_space::Vector) -> f64| corners.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+    let reach =
+        |of: fn(&sharp_space::Vector) -> f64| corners.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
     assert!((reach(|c| c.x) - 0.4).abs() < 1e-9 && (reach(|c| -c.x) - 0.2).abs() < 1e-9, "{corners:?}");
     assert!((reach(|c| c.y) - 0.24).abs() < 1e-3, "the wheels stand out: {corners:?}");
     assert_eq!((robot.max_speed_mps, robot.mass_kg), (0.8, 20.0));

@@ -157,7 +157,8 @@ fn wheels<'a>(
 
 /// The radius of a link that is a cylinder or a ball.
 fn radius_of(robot: Node<'_, '_>, link: &str) -> Result<Option<f64>, String> {
-    let link = robot.children().find(|node| node.has_tag_name("link") && node.attribute("name") == Some(link));
+    let link =
+        robot.children().find(|node| node.has_tag_name("link") && node.attribute("name") == Some(link));
     let shapes = link.into_iter().flat_map(|link| link.descendants());
     let radius = shapes
         .filter(|node| node.has_tag_name("cylinder") || node.has_tag_name("sphere"))
@@ -171,7 +172,8 @@ fn drive(wheels: &[Wheel], facts: &mut Facts) -> [f64; 2] {
         let values = wheels.iter().map(of);
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)))
     };
-    let ((rear_m, front_m), (right_m, left_m)) = (furthest(|wheel| wheel.at[0]), furthest(|wheel| wheel.at[1]));
+    let ((rear_m, front_m), (right_m, left_m)) =
+        (furthest(|wheel| wheel.at[0]), furthest(|wheel| wheel.at[1]));
     if wheels.len() < 2 || left_m - right_m < 1e-3 {
         facts.warnings.push(
             "the robot description has no pair of wheels (continuous joints called wheel): its origin is taken as \
@@ -198,7 +200,11 @@ fn drive(wheels: &[Wheel], facts: &mut Facts) -> [f64; 2] {
     }
     let speeds = wheels.iter().filter_map(|wheel| Some(wheel.radius_m? * wheel.velocity_radps?));
     if let Some(speed_mps) = speeds.filter(|&speed| speed > 0.0 && speed < 20.0).reduce(f64::min) {
-        facts.add(Quantity::MaxSpeed, rounded(speed_mps), "velocity of the wheel joints and radius of the wheels");
+        facts.add(
+            Quantity::MaxSpeed,
+            rounded(speed_mps),
+            "velocity of the wheel joints and radius of the wheels",
+        );
     }
     [0.5 * (rear_m + front_m), 0.5 * (right_m + left_m)]
 }
@@ -231,7 +237,8 @@ fn outline(
     }
     let seen: Vec<Vector> =
         points.iter().map(|point| Vector::new(point[0] - middle[0], point[1] - middle[1])).collect();
-    let seen: Vec<Vector> = seen.iter().map(|corner| Vector::new(rounded(corner.x), rounded(corner.y))).collect();
+    let seen: Vec<Vector> =
+        seen.iter().map(|corner| Vector::new(rounded(corner.x), rounded(corner.y))).collect();
     let outline = Footprint::polygon(&seen).or_else(|_| Footprint::polygon(&bounding(&seen)));
     let outline = outline.map_err(|error| format!("collision shapes: {error}"))?;
     facts.say_footprint(outline, URDF_OUTLINE);
@@ -297,10 +304,14 @@ fn masses(
     for link in robot.children().filter(|node| node.has_tag_name("link")) {
         let Some(inertial) = child(link, "inertial") else { continue };
         let value = |tag: &str, key: &str| {
-            child(inertial, tag).and_then(|node| node.attribute(key)).map(|text| number(key, text)).transpose()
+            child(inertial, tag)
+                .and_then(|node| node.attribute(key))
+                .map(|text| number(key, text))
+                .transpose()
         };
         let link_kg = value("mass", "value")?.unwrap_or(0.0);
-        let frame = frames.get(link.attribute("name").unwrap_or_default()).copied().unwrap_or(Frame::IDENTITY);
+        let frame =
+            frames.get(link.attribute("name").unwrap_or_default()).copied().unwrap_or(Frame::IDENTITY);
         let at = frame.then(&origin(inertial)?).at;
         let (x, y) = (at[0] - middle[0], at[1] - middle[1]);
         mass_kg += link_kg;
@@ -362,7 +373,8 @@ impl Frame {
     }
 
     fn then(&self, next: &Self) -> Self {
-        let column = |index: usize| self.turn([next.rows[0][index], next.rows[1][index], next.rows[2][index]]);
+        let column =
+            |index: usize| self.turn([next.rows[0][index], next.rows[1][index], next.rows[2][index]]);
         let columns = [column(0), column(1), column(2)];
         let rows = [0, 1, 2].map(|row| [columns[0][row], columns[1][row], columns[2][row]]);
         Self { rows, at: self.place(next.at) }

@@ -36,7 +36,8 @@ const NUMBERS: [(&str, Option<Quantity>, &str); 10] = [
 pub(super) fn robot(name: &str, files: &[PathBuf], mut facts: Facts) -> Result<ImportedRobot, ImportError> {
     let missing = |what, remedy| ImportError::Missing { what, files: listed(files), remedy };
     let Some(outline) = facts.footprint.clone() else {
-        let remedy = "a Nav2 costmap has footprint or robot_radius, a URDF collision shapes; name that file as well";
+        let remedy =
+            "a Nav2 costmap has footprint or robot_radius, a URDF collision shapes; name that file as well";
         return Err(missing("footprint", remedy));
     };
     let Some(speed) = facts.numbers.get(&Quantity::MaxSpeed).cloned() else {
@@ -133,7 +134,8 @@ struct DriveLine {
 /// A car whose footprint lies ahead of `base_link` has it on its rear axle, as is usual; here poses are those of the
 /// middle between the axles.
 fn around_the_middle(outline: Fact<Footprint>, drive: &DriveLine, facts: &mut Facts) -> Fact<Footprint> {
-    let (Some(wheelbase_m), FootprintShape::Polygon { corners }) = (drive.car_wheelbase_m, outline.value.shape())
+    let (Some(wheelbase_m), FootprintShape::Polygon { corners }) =
+        (drive.car_wheelbase_m, outline.value.shape())
     else {
         return outline;
     };
@@ -173,7 +175,8 @@ fn drive(outline: &Footprint, facts: &Facts) -> DriveLine {
         })
     };
     let track = told("track", Quantity::Track);
-    let mut words: Vec<String> = track.iter().map(|track_m| format!("track_m: {}", number_text(*track_m))).collect();
+    let mut words: Vec<String> =
+        track.iter().map(|track_m| format!("track_m: {}", number_text(*track_m))).collect();
     let mut car_wheelbase_m = None;
     if is_car {
         let wheelbase_m = told("wheelbase", Quantity::Wheelbase).filter(|&wheelbase_m| wheelbase_m > 0.0);
@@ -184,7 +187,10 @@ fn drive(outline: &Footprint, facts: &Facts) -> DriveLine {
         });
         let steer_rad = number(Quantity::MaxSteer).unwrap_or_else(|| {
             let of_radius = radius_m.map(|radius_m| trig::atan2(wheelbase_m, radius_m));
-            sources.push(if of_radius.is_some() { "steering angle of that radius" } else { "steering angle assumed" }.to_owned());
+            sources.push(
+                if of_radius.is_some() { "steering angle of that radius" } else { "steering angle assumed" }
+                    .to_owned(),
+            );
             of_radius.unwrap_or(STEER_RAD)
         });
         car_wheelbase_m = Some(wheelbase_m);
@@ -193,7 +199,9 @@ fn drive(outline: &Footprint, facts: &Facts) -> DriveLine {
         if let Some(rate_radps) = number(Quantity::SteerRate).filter(|&rate_radps| rate_radps <= 100.0) {
             words.push(format!("steer_rate_radps: {}", number_text(rate_radps)));
         }
-    } else if let Some(wheelbase_m) = told("wheelbase", Quantity::Wheelbase).filter(|&length_m| length_m > 0.0) {
+    } else if let Some(wheelbase_m) =
+        told("wheelbase", Quantity::Wheelbase).filter(|&length_m| length_m > 0.0)
+    {
         words.push(format!("wheelbase_m: {}", number_text(wheelbase_m)));
     }
     let kind = if is_car { "Ackermann" } else { "Differential" };
@@ -244,9 +252,7 @@ fn outline_text(outline: &Footprint) -> String {
     match outline.shape() {
         FootprintShape::Disc { radius_m } => format!("(radius_m: {})", number_text(radius_m)),
         FootprintShape::Polygon { corners } => {
-            let corner = |corner: &Vector| {
-                format!("({}, {})", number_text(corner.x), number_text(corner.y))
-            };
+            let corner = |corner: &Vector| format!("({}, {})", number_text(corner.x), number_text(corner.y));
             format!("(corners: [{}])", corners.iter().map(corner).collect::<Vec<_>>().join(", "))
         }
         _ => format!(

@@ -92,7 +92,12 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
                 let map = MapReport::new(&map.name, &map.grid);
                 say!("{}", to_json(&Saved { schema: "sharp.map.save/1", map, file }));
             } else {
-                say!("{}: {} x {} cells written to {file} and the PGM beside it", map.name, frame.width, frame.height);
+                say!(
+                    "{}: {} x {} cells written to {file} and the PGM beside it",
+                    map.name,
+                    frame.width,
+                    frame.height
+                );
             }
             Ok(Exit::Done)
         }

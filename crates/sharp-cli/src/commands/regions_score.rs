@@ -210,8 +210,7 @@ fn at_doors(
     doors: &Path,
     json: bool,
 ) -> Result<Exit, Failure> {
-    let map_args =
-        MapArgs {
+    let map_args = MapArgs {
         map: map.to_owned(),
         resolution: None,
         unknown: Unknown::Blocked,

@@ -76,7 +76,13 @@ fn list(json: bool) {
         } else {
             "turns in place".to_owned()
         };
-        say!("{:<11} {:<12} {:<22} {:>5.2} m/s  {turns}", robot.name, robot.drive, robot.footprint, robot.max_speed_mps);
+        say!(
+            "{:<11} {:<12} {:<22} {:>5.2} m/s  {turns}",
+            robot.name,
+            robot.drive,
+            robot.footprint,
+            robot.max_speed_mps
+        );
     }
 }
 
@@ -105,7 +111,10 @@ fn show(name: &str, json: bool) -> Result<(), Failure> {
     let robot = named::robot(name)?;
     if json {
         let (min_turning_radius_m, yaw_gain) = (robot.min_turning_radius_m(), robot.yaw_gain());
-        say!("{}", to_json(&Shown { schema: "sharp.robot/1", robot: &robot, min_turning_radius_m, yaw_gain }));
+        say!(
+            "{}",
+            to_json(&Shown { schema: "sharp.robot/1", robot: &robot, min_turning_radius_m, yaw_gain })
+        );
         return Ok(());
     }
     let text = ron::ser::to_string_pretty(&robot, ron::ser::PrettyConfig::default().struct_names(true));

@@ -1,11 +1,10 @@
 //! `sharp run`: executes a plan in a simulator and counts.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use sharp_bench::{RunReport, clock_us, named, pictures};
 use sharp_maps::{LoadOptions, load};
-use sharp_plan::{Plan, RunSettings, run as run_plan, write_atomic};
+use sharp_plan::{Tour, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{Collisions, Run, Switch};
@@ -14,9 +13,9 @@ use crate::{input, progress};
 
 pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     let simulator = input::simulator(&args.simulator)?;
-    let plan = Arc::new(load_plan(&args.plan_dir)?);
-    let mut settings = RunSettings::new(&plan, args.episodes, Seed(seed));
-    settings.simulator = plan.world.simulator(simulator);
+    let tour = load_tour(&args.plan_dir)?;
+    let mut settings = tour.run_settings(args.episodes, Seed(seed));
+    settings.simulator = tour.plans[0].world.simulator(simulator);
     if let Some(noise) = &args.noise {
         settings.noise = named::noise(noise)?;
     }
@@ -24,10 +23,10 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     settings.contact_ends = args.collisions == Collisions::End;
 
     let spinner = progress::spinner("driving");
-    let episodes = run_plan(&plan, &settings, &clock_us());
+    let episodes = tour.run(&settings, &clock_us());
     spinner.finish_and_clear();
-    let report = RunReport::new(&plan, &episodes);
-    let picture = pictures::plan(&plan, &plan.solution.query, &episodes);
+    let report = RunReport::predicted(tour.predicted, &episodes);
+    let picture = pictures::tour(&tour, &episodes);
     pictures::write(&args.plan_dir, "run", &picture)?;
     write_atomic(&args.plan_dir.join("run.json"), (to_json(&report) + "\n").as_bytes())?;
     if json {
@@ -57,12 +56,12 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Reads the plan in `folder` with its map.
-pub(crate) fn load_plan(folder: &Path) -> Result<Plan, Failure> {
+/// Reads the plan or the plans in a row in `folder` with their map.
+pub(crate) fn load_tour(folder: &Path) -> Result<Tour, Failure> {
     let map = folder.join("map.yaml");
     let spec = map
         .to_str()
         .ok_or_else(|| Failure::new("FILE_INVALID", format!("{} is not printable", map.display())))?;
     let grid = load(spec, &LoadOptions::default())?.grid;
-    Ok(Plan::load(folder, grid)?)
+    Ok(Tour::load(folder, &grid)?)
 }

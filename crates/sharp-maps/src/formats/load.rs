@@ -130,7 +130,8 @@ fn load_cells(
             warnings.push(format!("{spec}: read as {} beside it says", yaml.display()));
             return ros::load(&yaml, options, warnings);
         }
-        let expected = "given in metres a pixel, as a plain image does not state it and no .yaml beside it does";
+        let expected =
+            "given in metres a pixel, as a plain image does not state it and no .yaml beside it does";
         let resolution_m =
             options.resolution_m.ok_or_else(|| MapError::field(spec, "resolution", "missing", expected))?;
         let picture = picture::decode(spec, &bytes)?;

@@ -38,15 +38,21 @@ fn parse(file: &str, text: &str, number: usize) -> Result<Scenario, MapError> {
     if !matches!(first, "version 1" | "version 1.0") {
         return Err(MapError::field(file, "line 1", quoted(first), "`version 1`"));
     }
-    let problems: Vec<(usize, &str)> =
-        lines.enumerate().filter(|(_, line)| !line.trim().is_empty()).map(|(index, line)| (index + 2, line)).collect();
+    let problems: Vec<(usize, &str)> = lines
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(|(index, line)| (index + 2, line))
+        .collect();
     let Some(&(line, text)) = number.checked_sub(1).and_then(|index| problems.get(index)) else {
         return Err(MapError::field(file, "problem", number, format!("1 to {}", problems.len())));
     };
     let fields: Vec<&str> = text.split('\t').map(str::trim).collect();
-    let expected = "nine fields with tabs between: bucket, map, width, height, start x, start y, goal x, goal y, length";
+    let expected =
+        "nine fields with tabs between: bucket, map, width, height, start x, start y, goal x, goal y, length";
     let broken = || MapError::field(file, format!("line {line}"), quoted(text), expected);
-    let &[_, map, width, height, start_x, start_y, goal_x, goal_y, length] = &fields[..] else { return Err(broken()) };
+    let &[_, map, width, height, start_x, start_y, goal_x, goal_y, length] = &fields[..] else {
+        return Err(broken());
+    };
     let whole = |text: &str| text.parse::<usize>().map_err(|_| broken());
     let optimal_length: f64 = length.parse().map_err(|_| broken())?;
     if !(optimal_length >= 0.0 && optimal_length.is_finite()) {
@@ -84,7 +90,8 @@ mod tests {
 
     use super::*;
 
-    const TEXT: &str = "version 1\n0\tm.map\t4\t2\t0\t0\t3\t1\t3.41421356\n\n1\tm.map\t8\t4\t0\t0\t7\t3\t8\n2\tbroken\n";
+    const TEXT: &str =
+        "version 1\n0\tm.map\t4\t2\t0\t0\t3\t1\t3.41421356\n\n1\tm.map\t8\t4\t0\t0\t7\t3\t8\n2\tbroken\n";
 
     #[test]
     fn places_count_from_the_upper_left() {
@@ -93,7 +100,11 @@ mod tests {
         assert_eq!(first.places(&frame), [Point::new(10.25, 0.75), Point::new(11.75, 0.25)]);
         assert_eq!(first.optimal_length, 3.414_213_56);
         let scaled = parse("s", TEXT, 2).expect("a blank line is no problem");
-        assert_eq!(scaled.places(&frame), [Point::new(10.125, 0.875), Point::new(11.875, 0.125)], "twice as fine");
+        assert_eq!(
+            scaled.places(&frame),
+            [Point::new(10.125, 0.875), Point::new(11.875, 0.125)],
+            "twice as fine"
+        );
     }
 
     #[test]
