@@ -127,8 +127,8 @@ impl ComposedPolicy {
         self.still = StandstillDetector::new(self.automaton.observation().state.pose);
     }
 
-    /// The decision of the option's policy.
-    fn drive(&mut self) -> Decision {
+    /// The decision of the option's policy, whether or not its end is reached.
+    pub(crate) fn drive(&mut self) -> Decision {
         let (index, situation) = (self.automaton.index(), self.automaton.situation(&self.plan.world));
         let policy = &mut self.policies[index];
         if self.entered <= index {

@@ -1,7 +1,7 @@
 //! Several goals in a row: one plan for each, driven one after the other.
 //!
-//! Each plan begins where the guide of the one before it ends. A robot arrives elsewhere in the goal's disc and with another
-//! heading, so the way from there is planned anew when a plan takes over. How often the whole succeeds is counted on fresh
+//! Each plan begins where the guide of the one before it ends, so a robot that has reached a goal drives on to that place.
+//! Where it comes to stand elsewhere, the way from there is planned anew. How often the whole succeeds is counted on fresh
 //! runs from the first start to the last goal.
 
 use std::fmt;
@@ -24,6 +24,12 @@ use crate::files::{self, FileError};
 use crate::plan_file::Plan;
 
 const TOUR_FILE: &str = "tour.ron";
+/// A robot drives on to the end of the guide after it has reached a goal that is not the last, until it is this near, metres,
+/// or gets no nearer, or for so many actions: the next plan begins there.
+const END_WITHIN_M: f64 = 0.1;
+const ACTIONS_TO_END_MAX: u32 = 8;
+/// Where it is then nearer to the start of the next plan than this, metres and radians, that plan holds as it is.
+const START_WITHIN: (f64, f64) = (0.25, 0.4);
 /// Most runs that a prediction is counted on: each plans anew at every goal, which takes far longer than driving.
 const VERIFIED_MAX: u32 = 200;
 /// More plans in a row are a broken file.
@@ -169,6 +175,8 @@ pub struct TourPolicy {
     recovery: bool,
     /// What went otherwise than planned in the plans before.
     before: Events,
+    /// Actions since the present goal was reached, and the least distance from the end of the guide, metres.
+    since_reached: (u32, f64),
 }
 
 impl fmt::Debug for TourPolicy {
@@ -187,13 +195,22 @@ impl TourPolicy {
         plans.reverse();
         let first = plans.pop().expect("a tour has a plan");
         let current = ComposedPolicy::new(first, state, recovery);
-        Self { to_come: plans, current, recovery, before: Events::default() }
+        Self { to_come: plans, current, recovery, before: Events::default(), since_reached: (0, f64::INFINITY) }
     }
 
     /// The option that is running.
     #[must_use]
     pub fn option(&self) -> &GuidedOption {
         self.current.option()
+    }
+
+    /// Whether a robot that has reached its present goal still comes nearer to the end of the guide.
+    fn is_nearing_the_end(&mut self) -> bool {
+        let end = self.current.option().guide.end();
+        let off_m = self.current.observation().state.pose.distance_m(&end);
+        let (actions, least_m) = self.since_reached;
+        self.since_reached = (actions + 1, off_m.min(least_m));
+        off_m > END_WITHIN_M && off_m < least_m && actions < ACTIONS_TO_END_MAX
     }
 
     /// Goals that come after the present one.
@@ -226,10 +243,20 @@ impl Controller for TourPolicy {
             if decision != Decision::Reached {
                 return decision;
             }
-            let Some(next) = self.to_come.pop() else { return decision };
+            let Some(next) = self.to_come.last().cloned() else { return decision };
+            if self.is_nearing_the_end() {
+                return self.current.drive();
+            }
+            self.to_come.pop();
             self.before = self.events();
+            self.since_reached = (0, f64::INFINITY);
             let state = self.current.observation().state;
-            self.current = ComposedPolicy::arriving(next, state, self.recovery);
+            let start = next.solution.query.start;
+            let (within_m, within_rad) = START_WITHIN;
+            let is_there = state.pose.distance_m(&start) < within_m
+                && state.pose.heading.turn_to(start.heading).abs() < within_rad;
+            let begin = if is_there { ComposedPolicy::new } else { ComposedPolicy::arriving };
+            self.current = begin(next, state, self.recovery);
         }
     }
 
