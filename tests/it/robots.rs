@@ -73,16 +73,16 @@ fn overlap_m(outline: &Outline, pose: Pose, (x, y): (f64, f64), side_m: f64) -> 
 fn deepest_m(grid: &OccupancyGrid, outline: &Outline, pose: Pose) -> f64 {
     let frame = grid.frame();
     let side_m = frame.resolution_m;
+    let near = |at_m: f64, from_m: f64, count: usize| {
+        let at = (at_m - from_m) / side_m;
+        (at - 1.0 / side_m).max(0.0) as usize..((at + 1.0 / side_m).max(0.0) as usize).min(count)
+    };
+    let origin = frame.origin.position;
     let mut deepest_m = f64::NEG_INFINITY;
-    for row in 0..frame.height {
-        let y = frame.origin.position.y + (row as f64 + 0.5) * side_m;
-        if (y - pose.position.y).abs() > 1.0 {
-            continue;
-        }
-        for col in 0..frame.width {
-            let x = frame.origin.position.x + (col as f64 + 0.5) * side_m;
-            let cell = sharp_space::Cell::new(col, row);
-            if (x - pose.position.x).abs() < 1.0 && grid.get(cell) != Occupancy::Free {
+    for row in near(pose.position.y, origin.y, frame.height) {
+        for col in near(pose.position.x, origin.x, frame.width) {
+            if grid.get(sharp_space::Cell::new(col, row)) != Occupancy::Free {
+                let (x, y) = (origin.x + (col as f64 + 0.5) * side_m, origin.y + (row as f64 + 0.5) * side_m);
                 deepest_m = deepest_m.max(overlap_m(outline, pose, (x, y), side_m));
             }
         }

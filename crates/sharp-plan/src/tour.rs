@@ -195,7 +195,13 @@ impl TourPolicy {
         plans.reverse();
         let first = plans.pop().expect("a tour has a plan");
         let current = ComposedPolicy::new(first, state, recovery);
-        Self { to_come: plans, current, recovery, before: Events::default(), since_reached: (0, f64::INFINITY) }
+        Self {
+            to_come: plans,
+            current,
+            recovery,
+            before: Events::default(),
+            since_reached: (0, f64::INFINITY),
+        }
     }
 
     /// The option that is running.
