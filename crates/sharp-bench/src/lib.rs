@@ -72,7 +72,7 @@ pub use reports::{
 pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
 };
-pub use robot_import::{Finding, ImportError, ImportWishes, ImportedRobot, import_robot};
+pub use robot_import::{ImportError, ImportWishes, ImportedField, ImportedRobot, import_robot};
 pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
 pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
 pub use tensorboard::EventFile;

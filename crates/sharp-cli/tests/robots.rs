@@ -79,7 +79,8 @@ fn built_in_robots_are_listed_and_known_in_any_case() {
 #[test]
 fn the_robot_files_of_the_documents_are_read() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = include_str!("../../../docs/robots.md");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/robots.md");
+    let page = fs::read_to_string(page).expect("the page");
     let files: Vec<&str> =
         page.split("```ron\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
     assert_eq!(files.len(), 2, "examples of the page");

@@ -74,7 +74,7 @@ pub struct ImportWishes {
 
 /// A value of an imported robot and where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
+pub struct ImportedField {
     /// The field of the robot file.
     pub field: &'static str,
     /// Its value, as the file writes it.
@@ -91,9 +91,9 @@ pub struct ImportedRobot {
     /// The robot file, with comments.
     pub text: String,
     /// What the files say.
-    pub found: Vec<Finding>,
+    pub found: Vec<ImportedField>,
     /// What they do not say.
-    pub assumed: Vec<Finding>,
+    pub assumed: Vec<ImportedField>,
     /// What was read in another way than its owner may expect.
     pub warnings: Vec<String>,
 }

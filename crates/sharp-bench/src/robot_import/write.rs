@@ -8,7 +8,7 @@ use sharp_space::{Footprint, FootprintShape, Vector, trig};
 
 use super::facts::{Fact, Facts, Quantity};
 use super::urdf::URDF_OUTLINE;
-use super::{Finding, ImportError, ImportedRobot, listed};
+use super::{ImportError, ImportedField, ImportedRobot, listed};
 
 /// The wheelbase of a car that does not say, as a share of its length.
 const WHEELBASE_SHARE: f64 = 0.6;
@@ -45,7 +45,7 @@ pub(super) fn robot(name: &str, files: &[PathBuf], mut facts: Facts) -> Result<I
                       --max-speed M/S";
         return Err(missing("top speed", remedy));
     };
-    let mut parts = Parts::default();
+    let mut parts = RobotLines::default();
     let drive = drive(&outline.value, &facts);
     let outline = around_the_middle(outline, &drive, &mut facts);
     parts.found("footprint", outline_text(&outline.value), &outline.source);
@@ -53,7 +53,7 @@ pub(super) fn robot(name: &str, files: &[PathBuf], mut facts: Facts) -> Result<I
     parts.found("max_speed_mps", number_text(speed.value), &speed.source);
     let mut numbers = numbers(&facts, &mut parts, &mut Vec::new());
     // An inertia that no body of that mass and those wheels has is a placeholder of the description's author.
-    let complete = |parts: &Parts| RobotModel::from_ron(&parts.bare(name));
+    let complete = |parts: &RobotLines| RobotModel::from_ron(&parts.bare(name));
     let robot = complete(&parts).or_else(|error| {
         if facts.numbers.remove(&Quantity::YawInertia).is_none() {
             return Err(error);
@@ -69,7 +69,8 @@ pub(super) fn robot(name: &str, files: &[PathBuf], mut facts: Facts) -> Result<I
     }
     let text = parts.text(name, files);
     let (assumed, found): (Vec<_>, Vec<_>) = parts.fields.into_iter().partition(|field| field.assumed);
-    let finding = |field: Field| Finding { field: field.field, value: field.value, source: field.source };
+    let finding =
+        |field: Field| ImportedField { field: field.field, value: field.value, source: field.source };
     Ok(ImportedRobot {
         robot,
         text,
@@ -88,11 +89,11 @@ struct Field {
 }
 
 #[derive(Default)]
-struct Parts {
+struct RobotLines {
     fields: Vec<Field>,
 }
 
-impl Parts {
+impl RobotLines {
     fn found(&mut self, field: &'static str, value: String, source: &str) {
         self.fields.push(Field { field, value, source: source.to_owned(), assumed: false });
     }
@@ -222,7 +223,7 @@ fn length_m(outline: &Footprint) -> f64 {
 }
 
 /// Adds the numbers that are known and returns the fields of the others.
-fn numbers(facts: &Facts, parts: &mut Parts, unknown: &mut Vec<&'static str>) -> Vec<&'static str> {
+fn numbers(facts: &Facts, parts: &mut RobotLines, unknown: &mut Vec<&'static str>) -> Vec<&'static str> {
     for &(field, quantity, _) in &NUMBERS {
         match quantity.and_then(|quantity| facts.numbers.get(&quantity)) {
             Some(fact) => parts.found(field, number_text(fact.value), &fact.source),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use sharp_bench::{Finding, ImportWishes, import_robot, named};
+use sharp_bench::{ImportWishes, ImportedField, import_robot, named};
 use sharp_plan::write_atomic;
 use sharp_sim::RobotModel;
 use sharp_space::FootprintShape;
@@ -28,7 +28,7 @@ struct Summary {
 }
 
 #[derive(Serialize)]
-struct Shown<'a> {
+struct ShownRobot<'a> {
     schema: &'static str,
     robot: &'a RobotModel,
     min_turning_radius_m: f64,
@@ -42,8 +42,8 @@ struct Imported<'a> {
     file: String,
     drive: &'static str,
     footprint: String,
-    found: &'a [Finding],
-    assumed: &'a [Finding],
+    found: &'a [ImportedField],
+    assumed: &'a [ImportedField],
     warnings: &'a [String],
 }
 
@@ -113,7 +113,7 @@ fn show(name: &str, json: bool) -> Result<(), Failure> {
         let (min_turning_radius_m, yaw_gain) = (robot.min_turning_radius_m(), robot.yaw_gain());
         say!(
             "{}",
-            to_json(&Shown { schema: "sharp.robot/1", robot: &robot, min_turning_radius_m, yaw_gain })
+            to_json(&ShownRobot { schema: "sharp.robot/1", robot: &robot, min_turning_radius_m, yaw_gain })
         );
         return Ok(());
     }
@@ -154,7 +154,7 @@ fn import(files: &[PathBuf], out: Option<PathBuf>, wishes: &ImportWishes, json: 
     Ok(())
 }
 
-fn print_finding(finding: &Finding) {
+fn print_finding(finding: &ImportedField) {
     say!("  {:<21} {:<40} {}", finding.field, finding.value, finding.source);
 }
 

@@ -23,4 +23,4 @@ pub use error::MapError;
 pub use load::{LoadOptions, MapFile, Problem, load};
 pub use named::named_maps;
 pub use save::save_ros;
-pub use scenario::{Scenario, load_scenario};
+pub use scenario::{MovingAiProblem, load_scenario};

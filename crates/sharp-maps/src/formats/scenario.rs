@@ -9,7 +9,7 @@ use super::files::{self, FileKind};
 
 /// One problem of a scenario file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scenario {
+pub struct MovingAiProblem {
     /// The map's file, as the scenario names it.
     pub map: String,
     /// Width and height of the map that the places are counted in, cells; 0 if the file does not say.
@@ -26,13 +26,13 @@ pub struct Scenario {
 ///
 /// # Errors
 /// If the file cannot be read, has fewer problems, or that line is broken.
-pub fn load_scenario(path: &Path, number: usize) -> Result<Scenario, MapError> {
+pub fn load_scenario(path: &Path, number: usize) -> Result<MovingAiProblem, MapError> {
     let file = path.display().to_string();
     let bytes = files::read(path, FileKind::Cells)?;
     parse(&file, files::as_text(&file, &bytes)?, number)
 }
 
-fn parse(file: &str, text: &str, number: usize) -> Result<Scenario, MapError> {
+fn parse(file: &str, text: &str, number: usize) -> Result<MovingAiProblem, MapError> {
     let mut lines = text.lines();
     let first = lines.next().unwrap_or("").trim();
     if !matches!(first, "version 1" | "version 1.0") {
@@ -58,7 +58,7 @@ fn parse(file: &str, text: &str, number: usize) -> Result<Scenario, MapError> {
     if !(optimal_length >= 0.0 && optimal_length.is_finite()) {
         return Err(broken());
     }
-    Ok(Scenario {
+    Ok(MovingAiProblem {
         map: map.to_owned(),
         size: (whole(width)?, whole(height)?),
         start: (whole(start_x)?, whole(start_y)?),
@@ -67,7 +67,7 @@ fn parse(file: &str, text: &str, number: usize) -> Result<Scenario, MapError> {
     })
 }
 
-impl Scenario {
+impl MovingAiProblem {
     /// Start and goal on the map `frame`, which is scaled if its size is not the scenario's.
     #[must_use]
     pub fn places(&self, frame: &GridFrame) -> [Point; 2] {
