@@ -274,23 +274,21 @@ fn shape(geometry: Node<'_, '_>) -> Result<Option<Vec<[f64; 3]>>, String> {
             [radius * cos, radius * sin, if index < ROUND_CORNERS { height } else { -height }]
         })
     };
-    for node in geometry.children().filter(Node::is_element) {
-        return Ok(Some(match node.tag_name().name() {
-            "box" => {
-                let [x, y, z] = triple("size", &attribute(node, "size")?)?.map(|side| 0.5 * side);
-                let signs = [-1.0, 1.0];
-                let corners = signs.iter().flat_map(|sx| signs.iter().map(move |sy| (sx, sy)));
-                corners.flat_map(|(sx, sy)| signs.iter().map(move |sz| [sx * x, sy * y, sz * z])).collect()
-            }
-            "cylinder" => {
-                let radius = number("radius", &attribute(node, "radius")?)?;
-                round(radius, 0.5 * number("length", &attribute(node, "length")?)?).collect()
-            }
-            "sphere" => round(number("radius", &attribute(node, "radius")?)?, 0.0).collect(),
-            _ => return Ok(None),
-        }));
-    }
-    Ok(None)
+    let Some(node) = geometry.children().find(Node::is_element) else { return Ok(None) };
+    Ok(Some(match node.tag_name().name() {
+        "box" => {
+            let [x, y, z] = triple("size", &attribute(node, "size")?)?.map(|side| 0.5 * side);
+            let signs = [-1.0, 1.0];
+            let corners = signs.iter().flat_map(|sx| signs.iter().map(move |sy| (sx, sy)));
+            corners.flat_map(|(sx, sy)| signs.iter().map(move |sz| [sx * x, sy * y, sz * z])).collect()
+        }
+        "cylinder" => {
+            let radius = number("radius", &attribute(node, "radius")?)?;
+            round(radius, 0.5 * number("length", &attribute(node, "length")?)?).collect()
+        }
+        "sphere" => round(number("radius", &attribute(node, "radius")?)?, 0.0).collect(),
+        _ => return Ok(None),
+    }))
 }
 
 /// The mass of all links and their moment of inertia around the middle.
