@@ -5,4 +5,5 @@ mod library;
 mod maps;
 mod paper;
 mod regions;
+mod robots;
 mod worlds;

@@ -458,12 +458,14 @@ fn what_is_no_map_is_refused_with_what_would_be_one() {
     fs::write(path("fake.png"), "hello").expect("written");
     fs::write(path("broken.map"), "type octile\nheight 1\n").expect("written");
     fs::write(path("broken.ron"), "(size_m: 3)").expect("written");
+    // Unlike map.pgm it has no description beside it.
+    fs::copy(path("map.pgm"), path("lone.pgm")).expect("copied");
     for (file, code, says) in [
         ("text.txt", "MAP_FORMAT", "expected a ROS map (.yaml)"),
         ("fake.png", "MAP_IMAGE", "is no PNG, PGM or BMP image"),
         ("broken.map", "MAP_FIELD", "line 3 is \"\", must be `width`"),
         ("broken.ron", "MAP_SYNTAX", "is no floor plan"),
-        ("map.pgm", "MAP_FIELD", "resolution is missing"),
+        ("lone.pgm", "MAP_FIELD", "resolution is missing"),
         ("nothing.yaml", "MAP_UNREADABLE", "cannot be read"),
     ] {
         check_refused(file, load_path(&path(file)), code, &[file, says]);

@@ -41,10 +41,12 @@ mod measure;
 mod prior;
 mod reports;
 mod result;
+mod robot_import;
 mod solve;
 mod stopwatch;
 mod tensorboard;
 mod times;
+mod tour;
 
 pub use baselines::{FlatSac, Mpc, RoutePlanner, Rrt, SacBudget, Track};
 pub use contender::{ComparisonSettings, Composed, Contender, Driven, compare};
@@ -65,12 +67,15 @@ pub use prior::{
     score_policies, train_prior,
 };
 pub use reports::{
-    BaselineReport, BaselineTimes, MapReport, OptionReport, Predicted, RunReport, SolveReport, Verified,
+    BaselineReport, BaselineTimes, GoalReport, MapReport, OptionReport, Predicted, RunReport, SolveReport,
+    Verified,
 };
 pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
 };
+pub use robot_import::{ImportError, ImportWishes, ImportedField, ImportedRobot, import_robot};
 pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
 pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
 pub use tensorboard::EventFile;
 pub use times::{DecisionTimes, Reuse, SolveTimes};
+pub use tour::{SolvedTour, solve_tour};

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use sharp_drive::World;
@@ -108,19 +108,21 @@ impl NamedProblem {
     }
 }
 
-/// The robot called `name` (`husky`, `limo`), or described by the file of that name (RON).
+/// What is expected in place of an unknown robot.
+const ROBOTS: &str = "husky, limo, turtlebot3, jackal, car or a robot file";
+
+/// The robot called `name` (`husky`, `limo`, ..., in any case), or described by the file of that name (RON). A robot
+/// whose file does not name it has the file's name.
 ///
 /// # Errors
 /// If it is no known name and no file, or the file describes no robot.
 pub fn robot(name: &str) -> Result<RobotModel, InputError> {
-    match name {
-        "husky" => Ok(RobotModel::husky()),
-        "limo" => Ok(RobotModel::limo()),
-        file => {
-            let text = read_text(file, "robot", "husky, limo or a robot file")?;
-            RobotModel::from_ron(&text).map_err(|source| InputError::Robot { file: file.into(), source })
-        }
+    if let Some(robot) = RobotModel::built_in(name) {
+        return Ok(robot);
     }
+    let text = read_text(name, "robot", ROBOTS)?;
+    let stem = Path::new(name).file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
+    RobotModel::from_ron_named(&text, &stem).map_err(|source| InputError::Robot { file: name.into(), source })
 }
 
 /// The noise called `name` (`none`, `nominal`, `harsh`, `biased`, each also with a factor as in `nominal*2`), or
@@ -202,7 +204,7 @@ mod tests {
         let message = robot("tank").expect_err("unknown").to_string();
         assert_eq!(
             message,
-            "robot \"tank\" is no known name and no file, expected husky, limo or a robot file"
+            "robot \"tank\" is no known name and no file, expected husky, limo, turtlebot3, jackal, car or a robot file"
         );
         assert_eq!(noise("nominal*-1").expect_err("a broken factor").code(), "NOISE_INVALID");
         assert_eq!(noise("loud").expect_err("unknown").code(), "FILE_UNREADABLE");

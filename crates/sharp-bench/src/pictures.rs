@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sharp_draw::{Scene, Trajectory, svg_to_png};
 use sharp_drive::EpisodeEnd;
-use sharp_plan::{Abstraction, Execution, Plan, Query, write_atomic};
+use sharp_plan::{Abstraction, Execution, Plan, Query, Tour, write_atomic};
 use sharp_rbvd::StateAbstraction;
 use sharp_space::{OccupancyGrid, Point, Region};
 
@@ -62,12 +62,25 @@ pub fn abstraction(grid: &OccupancyGrid, abstraction: &Abstraction) -> String {
 /// The plan's guides over the faded abstraction, with what was driven.
 #[must_use]
 pub fn plan(plan: &Plan, query: &Query, executions: &[Execution]) -> String {
-    let (rbvd, steps) = (&*plan.abstraction.states, &plan.solution.steps);
-    let guides: Vec<Vec<Point>> = steps
-        .iter()
+    guides(&[plan], query, executions)
+}
+
+/// The guides of several plans in a row, with what was driven.
+#[must_use]
+pub fn tour(tour: &Tour, executions: &[Execution]) -> String {
+    let plans: Vec<&Plan> = tour.plans.iter().map(|plan| &**plan).collect();
+    let (start, goal) = (plans[0].solution.query.start, plans[plans.len() - 1].solution.query.goal);
+    guides(&plans, &Query { start, goal }, executions)
+}
+
+fn guides(plans: &[&Plan], query: &Query, executions: &[Execution]) -> String {
+    let plan = plans[0];
+    let rbvd = &*plan.abstraction.states;
+    let steps = || plans.iter().flat_map(|plan| &plan.solution.steps);
+    let guides: Vec<Vec<Point>> = steps()
         .map(|planned| planned.option.guide.poses().iter().map(|pose| pose.position).collect())
         .collect();
-    let targets: Vec<Point> = steps.iter().map(|planned| planned.option.target.center()).collect();
+    let targets: Vec<Point> = steps().map(|planned| planned.option.target.center()).collect();
     let trajectories: Vec<Trajectory> = executions
         .iter()
         .map(|run| Trajectory { poses: run.record.trace.clone(), failed: run.end != EpisodeEnd::Reached })

@@ -126,6 +126,17 @@ pub struct Predicted {
     pub sim_time_s: f64,
 }
 
+/// One of several goals in a row.
+#[derive(Clone, Debug, Serialize)]
+pub struct GoalReport {
+    /// Where it is, metres.
+    pub goal: [f64; 2],
+    /// The success that the plan from the goal before predicts by itself.
+    pub success: f64,
+    /// How many options of the whole plan lead to it.
+    pub legs: usize,
+}
+
 /// `sharp.solve/1`: what solving one problem gave.
 #[derive(Clone, Debug, Serialize)]
 pub struct SolveReport {
@@ -160,6 +171,9 @@ pub struct SolveReport {
     pub states: usize,
     /// Number of options between them.
     pub options_available: usize,
+    /// The goals in a row, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub goals: Vec<GoalReport>,
     /// The options of the plan in order.
     pub plan: Vec<OptionReport>,
     /// How many of them had been learnt before.
@@ -234,6 +248,12 @@ impl RunReport {
     /// Counts `executions` of `plan`.
     #[must_use]
     pub fn new(plan: &Plan, executions: &[Execution]) -> Self {
+        Self::predicted(plan.solution.predicted, executions)
+    }
+
+    /// Counts `executions` of what succeeded as often as `predicted` says.
+    #[must_use]
+    pub fn predicted(predicted: SuccessCount, executions: &[Execution]) -> Self {
         let count = sharp_plan::success(executions);
         let ended = |end: EpisodeEnd| executions.iter().filter(|run| run.end == end).count() as u32;
         let sum = |of: fn(&Execution) -> u32| executions.iter().map(of).sum();
@@ -251,7 +271,7 @@ impl RunReport {
             recoveries: sum(|run| run.events.recoveries),
             mean_sim_time_s: mean_of_successes(runs(), |record| record.time_s),
             mean_path_m: mean_of_successes(runs(), |record| record.path_m),
-            predicted_success: plan.solution.predicted.rate(),
+            predicted_success: predicted.rate(),
             decision_us: DecisionTimes::of(runs().map(|(_, record)| record)),
         }
     }

@@ -163,6 +163,7 @@ fn blank_report(
         regions: file.regions.clone(),
         states: file.rbvd.len(),
         options_available,
+        goals: vec![],
         plan: vec![],
         reuse: Reuse { uses: 0, reused: 0 },
         predicted: None,

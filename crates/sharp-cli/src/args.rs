@@ -1,5 +1,7 @@
 //! What a user may type: one definition feeds parsing and help.
 
+mod problem;
+mod robots;
 mod suites;
 
 use std::path::PathBuf;
@@ -9,6 +11,8 @@ use sharp_bench::{AbstractionRequest, BaselineKind, BaselineSettings};
 use sharp_options::OptionKind;
 use sharp_rbvd::CellMetric;
 
+pub(crate) use problem::ProblemArgs;
+pub(crate) use robots::{DriveName, Robots};
 pub(crate) use suites::{EngineName, Eval, Jobs, Submit, SuiteArgs};
 
 /// From a map to a policy that knows its odds: option learning for stochastic path planning.
@@ -47,12 +51,15 @@ pub(crate) enum Subcommands {
     /// Train and score the policy that options begin with.
     #[command(subcommand)]
     Prior(PriorCommand),
-    /// Look at a map file.
+    /// Look at a map file, or write it as a ROS map.
     #[command(subcommand)]
     Map(Map),
     /// Look at an option library.
     #[command(subcommand)]
     Library(Library),
+    /// Look at robots, or make one of a Nav2 parameter file or a URDF.
+    #[command(subcommand)]
+    Robot(Robots),
     /// Measure a system to compare with: RRT, tracking, MPPI or one flat policy.
     Baseline(Baseline),
     /// Run a suite of problems and write results and tables.
@@ -82,6 +89,12 @@ pub(crate) struct MapArgs {
     /// Let a ROS map name an image outside its own folder.
     #[arg(long)]
     pub(crate) allow_outside: bool,
+    /// Keep out of the occupied cells of this map as if there were walls, a keep-out mask of Nav2; may be repeated.
+    #[arg(long, value_name = "MASK")]
+    pub(crate) keepout: Vec<String>,
+    /// Make one cell of N x N; it is occupied if any of them is.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) downsample: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -120,8 +133,8 @@ impl Learning {
 /// What an abstraction is made of.
 #[derive(Debug, Args)]
 pub(crate) struct AbstractionArgs {
-    /// husky, limo or a robot file (.ron).
-    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
     pub(crate) robot: String,
     /// The kind of option.
     #[arg(long, value_enum, default_value_t = Kind::Interface)]
@@ -164,15 +177,14 @@ pub(crate) struct Solve {
     pub(crate) map: MapArgs,
     #[command(flatten)]
     pub(crate) abstraction: AbstractionArgs,
-    /// Initial configuration: metres, metres, radians in the map's frame.
-    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "goal")]
-    pub(crate) start: Option<String>,
-    /// Goal configuration; its heading is free and may be left out.
-    #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true, requires = "start")]
-    pub(crate) goal: Option<String>,
-    /// One of a named map's own problems, instead of --start and --goal.
-    #[arg(long, value_name = "1..5", conflicts_with_all = ["start", "goal"])]
-    pub(crate) problem: Option<usize>,
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// Drive there first, before the goal; may be repeated, in this order.
+    #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true)]
+    pub(crate) via: Vec<String>,
+    /// Exit with 1 if the plan predicts less success than this; it is written all the same.
+    #[arg(long, value_name = "P", default_value_t = 0.0)]
+    pub(crate) min_success: f64,
     /// How policies are learnt.
     #[arg(long, value_enum, default_value_t = Learning::Fast)]
     pub(crate) learning: Learning,
@@ -201,7 +213,7 @@ pub(crate) struct Solve {
     /// points wide, at the latest after 1000.
     #[arg(long, default_value = "auto", value_name = "N|auto")]
     pub(crate) verify: String,
-    /// Stop after so many seconds of wall time; what was learnt is kept.
+    /// Stop after so many seconds of wall time, with the best plan so far; what was learnt is kept.
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
     /// Write learning curves for TensorBoard there, one run a leg that is trained [default: none].
@@ -320,8 +332,8 @@ pub(crate) enum Regions {
 
 #[derive(Debug, Args)]
 pub(crate) struct RegionsTrain {
-    /// husky, limo or a robot file (.ron).
-    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
     pub(crate) robot: String,
     /// What computes: flex, or ndarray where it is compiled in.
     #[arg(long, default_value = "flex")]
@@ -353,8 +365,8 @@ pub(crate) struct RegionsTrain {
 
 #[derive(Debug, Args)]
 pub(crate) struct RegionsScore {
-    /// husky, limo or a robot file (.ron).
-    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
     pub(crate) robot: String,
     /// A map to score at its doors, instead of generated ones.
     #[arg(requires = "doors")]
@@ -410,8 +422,8 @@ impl Preset {
 
 #[derive(Debug, Args)]
 pub(crate) struct PriorTrain {
-    /// husky, limo or a robot file (.ron).
-    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
     pub(crate) robot: String,
     /// The file to write, safetensors; a run that was interrupted goes on from FILE.state.
     #[arg(long, value_name = "FILE")]
@@ -426,8 +438,8 @@ pub(crate) struct PriorTrain {
 
 #[derive(Debug, Args)]
 pub(crate) struct PriorCost {
-    /// husky, limo or a robot file (.ron).
-    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
     pub(crate) robot: String,
     /// The prior, as `sharp prior train` writes it [default: the shipped one].
     #[arg(long, value_name = "FILE")]
@@ -442,8 +454,8 @@ pub(crate) struct PriorCost {
 
 #[derive(Debug, Args)]
 pub(crate) struct PriorScore {
-    /// husky, limo or a robot file (.ron).
-    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
     pub(crate) robot: String,
     /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
@@ -469,12 +481,20 @@ pub(crate) struct PriorScore {
 pub(crate) enum Map {
     /// Size, resolution and free area of a map.
     Info(MapArgs),
+    /// Write a map of any kind as a ROS map: a YAML file, and a PGM image beside it.
+    Save {
+        #[command(flatten)]
+        map: MapArgs,
+        /// The YAML file.
+        #[arg(long, value_name = "FILE.yaml")]
+        out: PathBuf,
+    },
     /// Whether a robot has room in a map; exit code 1 if not.
     Check {
         #[command(flatten)]
         map: MapArgs,
-        /// husky, limo or a robot file (.ron).
-        #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+        /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
+        #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
         robot: String,
     },
 }
@@ -524,18 +544,11 @@ pub(crate) struct Baseline {
     pub(crate) system: BaselineName,
     #[command(flatten)]
     pub(crate) map: MapArgs,
-    /// husky, limo or a robot file (.ron).
-    #[arg(long, default_value = "husky", value_name = "husky|limo|FILE")]
+    /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
+    #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
     pub(crate) robot: String,
-    /// Initial configuration: metres, metres, radians in the map's frame.
-    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, requires = "goal")]
-    pub(crate) start: Option<String>,
-    /// Goal configuration; its heading is free and may be left out.
-    #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true, requires = "start")]
-    pub(crate) goal: Option<String>,
-    /// One of a named map's own problems, instead of --start and --goal.
-    #[arg(long, value_name = "1..5", conflicts_with_all = ["start", "goal"])]
-    pub(crate) problem: Option<usize>,
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
     /// Number of executions.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) episodes: u32,

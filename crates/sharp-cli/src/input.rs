@@ -2,22 +2,47 @@
 
 use std::path::{Path, PathBuf};
 
-use sharp_maps::{LoadOptions, MapFile, load};
+use sharp_maps::{LoadOptions, MapFile, load, load_scenario};
 use sharp_plan::Query;
 use sharp_sim::{SimulatorKind, UnknownSimulator};
-use sharp_space::Pose;
+use sharp_space::{Point, Pose, trig};
 
-use crate::args::{MapArgs, Unknown};
+use crate::args::{MapArgs, ProblemArgs, Unknown};
 use crate::outcome::Failure;
 
-/// Reads the map that `args` name.
+/// Maps of more cells are warned about: 4000 x 4000.
+const LARGE_CELLS: usize = 16_000_000;
+
+/// Reads the map that `args` name, as they want it.
 pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
     let options = LoadOptions {
         resolution_m: args.resolution,
         unknown_free: args.unknown == Unknown::Free,
         allow_outside: args.allow_outside,
     };
-    let map = load(&args.map, &options)?;
+    let mut map = load(&args.map, &options)?;
+    for mask in &args.keepout {
+        // Unknown cells of a mask mean nothing, whatever they mean in the map.
+        let keepout = load(mask, &LoadOptions { unknown_free: false, ..options })?;
+        if map.keep_out(&keepout.grid)? == 0 {
+            map.warnings.push(format!("--keepout {mask}: covers no cell of the map"));
+        }
+    }
+    if args.downsample > 1 {
+        map.downsample(args.downsample as usize)?;
+        let frame = map.grid.frame();
+        map.warnings.push(format!(
+            "cells are {} x {} of the map's now, {:.3} m: passages of less than two cells may be gone",
+            args.downsample, args.downsample, frame.resolution_m
+        ));
+    }
+    let frame = map.grid.frame();
+    if frame.len() > LARGE_CELLS {
+        map.warnings.push(format!(
+            "the map has {} x {} cells, which takes much memory and time; --downsample 2 makes it a quarter",
+            frame.width, frame.height
+        ));
+    }
     for warning in &map.warnings {
         eprintln!("warning: {warning}");
     }
@@ -98,26 +123,80 @@ pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
     })
 }
 
-/// The query that the flags of `solve` ask for.
-pub(crate) fn query(
-    map: &MapFile,
-    start: Option<&str>,
-    goal: Option<&str>,
-    problem: Option<usize>,
-) -> Result<Query, Failure> {
-    if let (Some(start), Some(goal)) = (start, goal) {
-        return Ok(Query {
-            start: pose("--start", start, HeadingRule::Needed)?,
-            goal: pose("--goal", goal, HeadingRule::Free)?,
-        });
+/// The query that the flags ask for.
+pub(crate) fn query(map: &MapFile, args: &ProblemArgs) -> Result<Query, Failure> {
+    if let Some(number) = args.problem {
+        return match &args.scen {
+            Some(file) => scenario(map, file, number),
+            None => own_problem(map, number),
+        };
     }
-    let Some(number) = problem else {
-        return Err(Failure::new("USAGE", "either --start and --goal or --problem is needed"));
+    let goal = match (&args.goal, &args.goal_pixel) {
+        (Some(goal), _) => Some(pose("--goal", goal, HeadingRule::Free)?),
+        (None, Some(pixel)) => Some(at_pixel(map, "--goal-pixel", pixel)?.0),
+        (None, None) => None,
     };
+    let start = match (&args.start, &args.start_pixel) {
+        (Some(start), _) => Some((pose("--start", start, HeadingRule::Needed)?, true)),
+        (None, Some(pixel)) => Some(at_pixel(map, "--start-pixel", pixel)?),
+        (None, None) => None,
+    };
+    match (start, goal) {
+        (Some((start, true)), Some(goal)) => Ok(Query { start, goal }),
+        (Some((start, false)), Some(goal)) => Ok(towards(start.position, goal.position)),
+        _ => Err(Failure::new("USAGE", "either --start and --goal or --problem is needed")),
+    }
+}
+
+/// A query that begins with the heading towards its goal.
+fn towards(start: Point, goal: Point) -> Query {
+    let way = goal - start;
+    let heading = trig::atan2(way.y, way.x);
+    Query { start: Pose::new(start.x, start.y, heading), goal: Pose::new(goal.x, goal.y, heading) }
+}
+
+/// The middle of a pixel typed as `C,R` or `C,R,YAW`, and whether there was a yaw.
+fn at_pixel(map: &MapFile, flag: &str, text: &str) -> Result<(Pose, bool), Failure> {
+    let (width, height) = (map.picture.width, map.picture.height);
+    let broken = || {
+        let expected =
+            format!("a column below {width} and a row below {height}, counted from the upper left: C,R");
+        Failure::new("POSE_INVALID", format!("{flag} is {text:?}, expected {expected}"))
+    };
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let (col, row, yaw) = match parts[..] {
+        [col, row] => (col, row, None),
+        [col, row, yaw] if flag == "--start-pixel" => (col, row, Some(yaw)),
+        _ => return Err(broken()),
+    };
+    let (Ok(col), Ok(row)) = (col.parse(), row.parse()) else { return Err(broken()) };
+    let point = map.pixel(col, row).ok_or_else(broken)?;
+    let typed = format!("{},{},{}", point.x, point.y, yaw.unwrap_or("0"));
+    Ok((pose(flag, &typed, HeadingRule::Needed)?, yaw.is_some()))
+}
+
+/// Problem `number` of the scenarios in `file`.
+fn scenario(map: &MapFile, file: &Path, number: usize) -> Result<Query, Failure> {
+    let scenario = load_scenario(file, number)?;
+    let named = Path::new(&scenario.map).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    if named.as_ref() != Some(&map.name) {
+        eprintln!("warning: {} has problems of {:?}, the map is {}", file.display(), scenario.map, map.name);
+    }
+    let [start, goal] = scenario.places(&map.picture);
+    let outside = |point: &Point| map.picture.cell_at(*point).is_none();
+    if outside(&start) || outside(&goal) {
+        let message = format!("problem {number} of {} lies outside the map", file.display());
+        return Err(Failure::new("PROBLEM_UNKNOWN", message));
+    }
+    Ok(towards(start, goal))
+}
+
+/// Problem `number` of a named map.
+fn own_problem(map: &MapFile, number: usize) -> Result<Query, Failure> {
     let count = map.problems.len();
     let problem = number.checked_sub(1).and_then(|index| map.problems.get(index)).ok_or_else(|| {
         let expected = if count == 0 {
-            "this map has no problems of its own".to_owned()
+            "this map has no problems of its own; --scen FILE names some".to_owned()
         } else {
             format!("expected 1..{count}")
         };

@@ -48,6 +48,7 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
         Subcommands::Prior(command) => commands::prior::run(command, cli.seed, cli.json),
         Subcommands::Map(command) => commands::map::run(command, cli.json),
         Subcommands::Library(command) => commands::library::run(command, cli.json),
+        Subcommands::Robot(command) => commands::robot::run(command, cli.json),
         Subcommands::Baseline(args) => commands::baseline::run(args, cli.seed, cli.json),
         Subcommands::Eval(args) => commands::eval::run(args, cli.seed, cli.json),
         Subcommands::Jobs(command) => commands::jobs::run(command, cli.seed, cli.json),

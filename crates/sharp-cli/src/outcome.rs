@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 pub(crate) use sharp_bench::to_json;
-use sharp_bench::{BenchError, InputError, ReportError, ResultError};
+use sharp_bench::{BenchError, ImportError, InputError, ReportError, ResultError};
 use sharp_draw::PngError;
 use sharp_export::RecordError;
 use sharp_maps::MapError;
@@ -95,6 +95,12 @@ impl From<BenchError> for Failure {
 impl From<InputError> for Failure {
     fn from(error: InputError) -> Self {
         Self::new(error.code(), error)
+    }
+}
+
+impl From<ImportError> for Failure {
+    fn from(error: ImportError) -> Self {
+        Self::new("ROBOT_INVALID", error)
     }
 }
 

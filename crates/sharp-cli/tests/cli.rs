@@ -86,7 +86,7 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
         (&["map", "check", "rooms.yaml", "--robot", "robot.ron"], "ROBOT_INVALID", "robot.ron"),
         (&["run", "missing"], "", "missing"),
         (&["run", "missing", "--simulator", "bullet"], "USAGE", "must be rapier2d"),
-        (&["map", "check", "a", "--robot", "tank"], "FILE_UNREADABLE", "husky, limo or a robot file"),
+        (&["map", "check", "a", "--robot", "tank"], "FILE_UNREADABLE", "car or a robot file"),
         (&["map", "check", "a", "--robot", "."], "FILE_UNREADABLE", "is a folder"),
         (&["map", "check", "a", "--robot", "full.pgm"], "ROBOT_INVALID", "full.pgm"),
         (&["map", "check", "a", "--robot", "bytes.ron"], "FILE_UNREADABLE", "is not UTF-8 text"),

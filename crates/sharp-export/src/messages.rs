@@ -1,7 +1,7 @@
 //! The ROS 2 messages that a recording holds: their definitions and their bytes.
 
 use sharp_sim::RobotState;
-use sharp_space::{Footprint, Occupancy, OccupancyGrid, Point, Pose};
+use sharp_space::{Footprint, Occupancy, OccupancyGrid, Pose};
 
 use crate::cdr::CdrWriter;
 use crate::path::{FRAME, quaternion, stamp};
@@ -225,7 +225,7 @@ pub(crate) fn transforms(time_s: f64, at: &Pose) -> Vec<u8> {
 /// `geometry_msgs/PolygonStamped`: the outline of the robot in its own frame.
 pub(crate) fn outline(time_s: f64, footprint: &Footprint) -> Vec<u8> {
     let mut writer = stamped(time_s, BASE_FRAME);
-    let corners: [Point; 4] = footprint.corners(&origin());
+    let corners = footprint.outline(&origin());
     writer.len(corners.len());
     for corner in corners {
         [corner.x as f32, corner.y as f32, 0.0].into_iter().for_each(|number| writer.f32(number));

@@ -26,5 +26,8 @@ mod generate;
 mod formats;
 
 #[cfg(feature = "files")]
-pub use formats::{Door, LoadOptions, MapError, MapFile, Problem, load, load_doors, named_maps, save_ros};
+pub use formats::{
+    Door, LoadOptions, MapError, MapFile, MovingAiProblem, Problem, load, load_doors, load_scenario,
+    named_maps, save_ros,
+};
 pub use generate::{FloorplanKind, generate, turned_from};

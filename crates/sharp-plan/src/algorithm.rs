@@ -80,6 +80,10 @@ fn algorithm_1(
         let p = join(problem, p);
         // 10 to 20: Pi <- pi_0, o.policy for each o in p, pi_{n+1}; who has no policy (14) is trained (11, 16, 19)
         if monitor.should_stop() || !learn_missing(problem, &p, &search, &mut policies)? {
+            // Whoever stops the search gets the best plan so far.
+            if best.is_some() {
+                break;
+            }
             return Ok(Outcome::Stopped);
         }
         // 17: the cost of an option is now what was measured, so a weak one may have a better alternative.
@@ -92,9 +96,7 @@ fn algorithm_1(
         }
         // Beyond the paper: Pi is repaired and measured, and the search looks again while another plan seems cheaper.
         monitor.phase(Phase::Verify);
-        if !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)? {
-            return Ok(Outcome::Stopped);
-        }
+        let is_stopped = !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)?;
         let solution = verify(problem, &p, &policies);
         verified += 1;
         search.offer_direct();
@@ -104,7 +106,10 @@ fn algorithm_1(
             best = Some(solution);
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
-        if verified == VERIFIED_MAX || best_s <= method.retry_above * other_s(&mut search, &policies) {
+        if is_stopped
+            || verified == VERIFIED_MAX
+            || best_s <= method.retry_above * other_s(&mut search, &policies)
+        {
             break;
         }
     }

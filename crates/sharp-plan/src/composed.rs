@@ -76,6 +76,18 @@ impl ComposedPolicy {
         }
     }
 
+    /// The composed policy of `plan` for a robot that comes to `state` from another plan: it may stand beside the guide and
+    /// look elsewhere, so there is a new way from where it is, if there is one.
+    pub(crate) fn arriving(plan: Arc<Plan>, state: RobotState, recovery: bool) -> Self {
+        let mut this = Self::new(plan, state, recovery);
+        if let Some((options, policies)) = this.replan() {
+            let observation = *this.automaton.observation();
+            this.automaton = Automaton::new(Link::chain(&options).into(), observation);
+            this.policies = policies;
+        }
+        this
+    }
+
     /// The option that is running.
     #[must_use]
     pub fn option(&self) -> &GuidedOption {
@@ -115,8 +127,8 @@ impl ComposedPolicy {
         self.still = StandstillDetector::new(self.automaton.observation().state.pose);
     }
 
-    /// The decision of the option's policy.
-    fn drive(&mut self) -> Decision {
+    /// The decision of the option's policy, whether or not its end is reached.
+    pub(crate) fn drive(&mut self) -> Decision {
         let (index, situation) = (self.automaton.index(), self.automaton.situation(&self.plan.world));
         let policy = &mut self.policies[index];
         if self.entered <= index {

@@ -13,7 +13,7 @@ use crate::composed::{ComposedPolicy, Events};
 use crate::plan_file::Plan;
 
 /// The time limit of an episode, in units of the predicted time.
-const TIME_LIMIT_FACTOR: f64 = 3.0;
+pub(crate) const TIME_LIMIT_FACTOR: f64 = 3.0;
 
 /// How a plan is run.
 #[derive(Clone, Debug)]

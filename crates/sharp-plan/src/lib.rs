@@ -48,6 +48,7 @@ mod recording;
 mod repair;
 mod search;
 mod sharp;
+mod tour;
 mod training_route;
 mod verify;
 
@@ -73,5 +74,6 @@ pub use query::{Monitor, Phase, Query, QueryError};
 pub use recording::{Moment, Recording, record};
 pub use search::{Search, Unplaced};
 pub use sharp::{Answer, Sharp, SolveError};
+pub use tour::{Tour, TourPolicy, end_of};
 pub use training_route::{RouteScenarios, TrainingRoute, training_routes};
 pub use verify::{PlannedOption, Solution};

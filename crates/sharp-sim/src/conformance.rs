@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use sharp_space::{CollisionChecker, Footprint, FootprintChecker, GridFrame, Occupancy, OccupancyGrid, Pose};
+use sharp_space::{
+    CollisionChecker, Footprint, FootprintChecker, FootprintShape, GridFrame, Occupancy, OccupancyGrid, Pose,
+};
 use thiserror::Error;
 
 use crate::obstacle_map::ObstacleMap;
@@ -103,10 +105,15 @@ fn walled_square() -> OccupancyGrid {
 
 /// Tests an outline that is smaller by what an engine may sink in.
 fn sunk_checker(grid: &OccupancyGrid, robot: &RobotModel) -> FootprintChecker {
-    let sunk = |half_m: f64| (half_m - SINK_MAX_M).max(0.5 * half_m);
     let own = &robot.footprint;
-    let outline = Footprint::rectangle(sunk(own.half_length_m()), sunk(own.half_width_m()));
-    FootprintChecker::new(grid, outline.expect("half of a footprint is one"))
+    let outline = match own.shape() {
+        FootprintShape::Rectangle { half_length_m, half_width_m } => {
+            let sunk = |half_m: f64| (half_m - SINK_MAX_M).max(0.5 * half_m);
+            Footprint::rectangle(sunk(half_length_m), sunk(half_width_m))
+        }
+        _ => own.grown(-SINK_MAX_M.min(0.5 * own.inscribed_radius_m())),
+    };
+    FootprintChecker::new(grid, outline.expect("less of a footprint is one"))
 }
 
 fn ahead(speed_mps: f64) -> WheelCommand {

@@ -39,6 +39,7 @@ mod rectangles;
 #[cfg(feature = "rigid3d")]
 mod rigid;
 mod robot;
+mod robot_file;
 mod simulator;
 mod state;
 mod vehicle;

@@ -15,7 +15,7 @@ use rapier2d::dynamics::{
 use rapier2d::geometry::{BroadPhaseBvh, ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase};
 use rapier2d::math::{Pose as EnginePose, Rot2, Vector as EngineVector};
 use rapier2d::pipeline::PhysicsPipeline;
-use sharp_space::Footprint;
+use sharp_space::{Footprint, FootprintShape};
 
 use crate::contact::ContactGuard;
 use crate::convert::{engine_vector, our_vector};
@@ -201,8 +201,7 @@ impl PlanarEngine {
         let robot = bodies.insert(
             RigidBodyBuilder::dynamic().pose(motion.pose).additional_mass_properties(mass).can_sleep(false),
         );
-        let (half_length, half_width) = (body.footprint.half_length_m(), body.footprint.half_width_m());
-        let shape = ColliderBuilder::cuboid(half_length as f32, half_width as f32);
+        let shape = outline(&body.footprint);
         let robot_shape =
             colliders.insert_with_parent(shape.density(0.0).friction(WALL_FRICTION), robot, &mut bodies);
         Self {
@@ -251,6 +250,23 @@ impl PlanarEngine {
             .contact_pairs_with(self.robot_shape)
             .any(|pair| pair.total_impulse_magnitude() > 0.0)
     }
+}
+
+/// The outline as the engine knows it.
+fn outline(footprint: &Footprint) -> ColliderBuilder {
+    match footprint.shape() {
+        FootprintShape::Disc { radius_m } => ColliderBuilder::ball(radius_m as f32),
+        FootprintShape::Polygon { corners } => {
+            let corners = corners.iter().map(|&corner| engine_vector(corner)).collect();
+            // Convex and counter-clockwise already: the engine computes no hull.
+            ColliderBuilder::convex_polyline(corners).unwrap_or_else(|| cover(footprint))
+        }
+        _ => cover(footprint),
+    }
+}
+
+fn cover(footprint: &Footprint) -> ColliderBuilder {
+    ColliderBuilder::cuboid(footprint.half_length_m() as f32, footprint.half_width_m() as f32)
 }
 
 /// Buffers that the engine reuses; no state of the simulation.

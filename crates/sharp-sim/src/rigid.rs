@@ -36,6 +36,8 @@ const WHEEL_MASS_SHARE: f64 = 0.05;
 /// Radius of the wheels by the shorter of track and wheelbase. The robot files give no radius, because on a
 /// flat floor it changes nothing.
 const WHEEL_RADIUS_SHARE: f64 = 0.3;
+/// Least distance between the axles, as a share of the track.
+const WHEELBASE_MIN_SHARE: f64 = 0.2;
 /// Damping of the wheels' motors, 1/s. The engine scales it by the joint's own inertia alone: a
 /// motor of 200 leaves a wheel too weak to skid.
 const MOTOR_GAIN_PS: f32 = 1e5;
@@ -158,8 +160,10 @@ struct RigidBodies {
 
 impl RigidBodies {
     fn new(robot: &RobotModel) -> Self {
-        let (x, y) = (robot.wheelbase_m() / 2.0, robot.track_m() / 2.0);
-        let wheel_radius_m = WHEEL_RADIUS_SHARE * robot.track_m().min(robot.wheelbase_m());
+        // A second axle close by stands in for casters.
+        let wheelbase_m = robot.wheelbase_m().max(WHEELBASE_MIN_SHARE * robot.track_m());
+        let (x, y) = (wheelbase_m / 2.0, robot.track_m() / 2.0);
+        let wheel_radius_m = WHEEL_RADIUS_SHARE * robot.track_m().min(wheelbase_m);
         let wheel_kg = WHEEL_MASS_SHARE * robot.mass_kg;
         let chassis_kg = robot.mass_kg - 4.0 * wheel_kg;
         let (half_length, half_width) = (robot.footprint.half_length_m(), robot.footprint.half_width_m());

@@ -1,13 +1,15 @@
-//! Robots as data: the outline, the wheels and the limits of a robot of the paper's evaluation.
+//! Robots as data: the outline, the wheels and the limits.
 //!
 //! A robot is a RON file (`assets/robots` of this crate); no other code of the project depends on a robot's
-//! name. The reference point is the centre of the footprint, which is also the middle between the axles.
+//! name. The reference point is the middle between the wheels, around which a robot with fixed wheels turns; the
+//! footprint may reach further to one side of it than to the other.
 
 use serde::{Deserialize, Serialize};
 use sharp_space::{Footprint, FootprintError, trig};
 use thiserror::Error;
 
 use crate::description::{self, SyntaxError};
+use crate::robot_file::RobotText;
 
 /// Longer names do not fit into a table, characters.
 const NAME_MAX: usize = 64;
@@ -33,6 +35,14 @@ pub enum RobotError {
         /// What is wrong with the outline.
         source: FootprintError,
     },
+    /// The file names no outline, or two.
+    #[error("robot {robot:?}: has {problem}, must have footprint or robot_radius")]
+    Outline {
+        /// The robot's name.
+        robot: String,
+        /// What is wrong.
+        problem: &'static str,
+    },
     /// A number is out of range or not a number.
     #[error("robot {robot:?}: {field} is {value}, must be {expected}")]
     Value {
@@ -51,11 +61,12 @@ pub enum RobotError {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Drive {
-    /// Two fixed wheels a side that drive at different speeds: turns in place by skidding.
+    /// Fixed wheels that drive at different speeds left and right: turns in place, with two wheels a side by
+    /// skidding.
     Differential {
         /// Distance between left and right wheels, metres.
         track_m: f64,
-        /// Distance between front and rear axle, metres.
+        /// Distance between front and rear axle, metres; 0 for one driven axle and casters.
         wheelbase_m: f64,
     },
     /// A car with steered front wheels.
@@ -71,9 +82,20 @@ pub enum Drive {
     },
 }
 
+impl Drive {
+    /// What it is called in results: `differential` or `ackermann`.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Differential { .. } => "differential",
+            Self::Ackermann { .. } => "ackermann",
+        }
+    }
+}
+
 /// A wheeled robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "RobotText")]
 pub struct RobotModel {
     /// What it is called in results and folders.
     pub name: String,
@@ -105,30 +127,70 @@ pub struct RobotModel {
     pub recovery_reverse_m: f64,
 }
 
+/// The robots that come with the crate: name and description.
+const BUILT_IN: [(&str, &str); 5] = [
+    ("husky", include_str!("../assets/robots/husky.ron")),
+    ("limo", include_str!("../assets/robots/limo.ron")),
+    ("turtlebot3", include_str!("../assets/robots/turtlebot3.ron")),
+    ("jackal", include_str!("../assets/robots/jackal.ron")),
+    ("car", include_str!("../assets/robots/car.ron")),
+];
+
 impl RobotModel {
+    /// The names of the built-in robots.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|&(name, _)| name)
+    }
+
+    /// The description of the built-in robot called `name`, in any case; `None` for other names.
+    #[must_use]
+    pub fn built_in_text(name: &str) -> Option<&'static str> {
+        BUILT_IN.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|&(_, text)| text)
+    }
+
+    /// The built-in robot called `name`, in any case; `None` for other names.
+    #[must_use]
+    pub fn built_in(name: &str) -> Option<Self> {
+        let text = Self::built_in_text(name)?;
+        Some(Self::from_ron(text).expect("every built-in robot is valid, as a test shows"))
+    }
+
     /// The Clearpath Husky of the paper: moves ahead and rotates in place.
     #[must_use]
     pub fn husky() -> Self {
-        Self::from_ron(include_str!("../assets/robots/husky.ron"))
-            .expect("the built-in husky is valid, as a test shows")
+        Self::built_in("husky").expect("it is built in")
     }
 
     /// The Limo of the paper, a small car: moves ahead and steers.
     #[must_use]
     pub fn limo() -> Self {
-        Self::from_ron(include_str!("../assets/robots/limo.ron"))
-            .expect("the built-in limo is valid, as a test shows")
+        Self::built_in("limo").expect("it is built in")
     }
 
-    /// Reads a robot from the text of a RON file.
+    /// Reads a robot from the text of a RON file. Footprint, drive and top speed are needed; the rest has
+    /// defaults.
     ///
     /// # Errors
     /// Returns an error that names the first unreadable place, or the first field out of range, its value and
     /// what is allowed.
     pub fn from_ron(text: &str) -> Result<Self, RobotError> {
-        let robot: Self = description::parse(text)?;
-        robot.validate()?;
-        Ok(robot)
+        description::parse::<RobotText>(text)?.try_into()
+    }
+
+    /// The same for a robot that is called `name` if the text does not say.
+    ///
+    /// # Errors
+    /// As [`from_ron`](Self::from_ron).
+    pub fn from_ron_named(text: &str, name: &str) -> Result<Self, RobotError> {
+        description::parse::<RobotText>(text)?.named(name).try_into()
+    }
+
+    /// The least moment of inertia that the wheel law can move, kg m². It corrects a whole slip in one step; a body
+    /// that is easier to turn than two point masses at the wheels would overshoot by more than the slip, and its
+    /// motion would diverge.
+    pub(crate) fn least_inertia_kgm2(&self) -> f64 {
+        let least = 0.5 * self.mass_kg * 0.25 * (self.wheelbase_m().powi(2) + self.track_m().powi(2));
+        (least * 1e3).ceil() / 1e3
     }
 
     /// The tightest turn of the rear axle's middle, metres; 0 for a robot that turns in place.
@@ -176,25 +238,23 @@ impl RobotModel {
         }
     }
 
-    fn validate(&self) -> Result<(), RobotError> {
+    pub(crate) fn validate(&self) -> Result<(), RobotError> {
         let length = self.name.chars().count();
         if !(1..=NAME_MAX).contains(&length) || self.name.chars().any(char::is_control) {
             return Err(RobotError::Name { name: self.name.clone() });
         }
-        Footprint::rectangle(self.footprint.half_length_m(), self.footprint.half_width_m())
-            .map_err(|source| RobotError::Footprint { robot: self.name.clone(), source })?;
         let positive = |field, value, max| self.require(field, value, f64::MIN_POSITIVE, max);
-        positive("drive.wheelbase_m", self.wheelbase_m(), 20.0)?;
         positive("drive.track_m", self.track_m(), 20.0)?;
-        if let Drive::Ackermann { max_steer_rad, steer_rate_radps, .. } = self.drive {
+        if let Drive::Differential { wheelbase_m, .. } = self.drive {
+            self.require("drive.wheelbase_m", wheelbase_m, 0.0, 20.0)?;
+        }
+        if let Drive::Ackermann { wheelbase_m, max_steer_rad, steer_rate_radps, .. } = self.drive {
+            positive("drive.wheelbase_m", wheelbase_m, 20.0)?;
             positive("drive.max_steer_rad", max_steer_rad, 1.4)?;
             positive("drive.steer_rate_radps", steer_rate_radps, 100.0)?;
         }
         positive("mass_kg", self.mass_kg, 1e5)?;
-        // The wheel law corrects a whole slip in one step; a body that is easier to turn than two point
-        // masses at the wheels would overshoot by more than the slip, and its motion would diverge.
-        let least = 0.5 * self.mass_kg * 0.25 * (self.wheelbase_m().powi(2) + self.track_m().powi(2));
-        self.require("yaw_inertia_kgm2", self.yaw_inertia_kgm2, (least * 1e3).ceil() / 1e3, 1e6)?;
+        self.require("yaw_inertia_kgm2", self.yaw_inertia_kgm2, self.least_inertia_kgm2(), 1e6)?;
         positive("wheel_friction", self.wheel_friction, 10.0)?;
         positive("max_speed_mps", self.max_speed_mps, 100.0)?;
         positive("max_accel_mps2", self.max_accel_mps2, 1000.0)?;
@@ -239,8 +299,17 @@ mod tests {
     }
 
     #[test]
+    fn built_in_robots_are_found_in_any_case_and_are_called_what_they_are() {
+        for name in RobotModel::names() {
+            let found = RobotModel::built_in(&name.to_uppercase()).map(|robot| robot.name);
+            assert_eq!(found.as_deref(), Some(name));
+        }
+        assert_eq!(RobotModel::built_in("tank"), None);
+    }
+
+    #[test]
     fn a_robot_survives_a_round_trip() {
-        for robot in [RobotModel::husky(), RobotModel::limo()] {
+        for robot in RobotModel::names().map(|name| RobotModel::built_in(name).expect(name)) {
             let text = ron::to_string(&robot).unwrap();
             assert_eq!(RobotModel::from_ron(&text).unwrap(), robot, "{text}");
         }
@@ -276,7 +345,8 @@ mod tests {
             LIMO,
             "half_width_m: 0.11",
             "half_width_m: -0.11",
-            r#"robot "limo": footprint half_width_m is -0.11 m, must be"#,
+            "robot description: line 5 \"footprint: Footprint(half_length_m: 0.16, half_width_m: -0.11),\": \
+             footprint half_width_m is -0.11 m, must be",
         );
         refuse(
             LIMO,
@@ -292,9 +362,9 @@ mod tests {
         );
         refuse(
             HUSKY,
-            "    mass_kg: 46.0,\n",
+            "    max_speed_mps: 1.0,\n",
             "",
-            "robot description: line 17 \")\": Unexpected missing field named `mass_kg`",
+            "robot description: line 17 \")\": Unexpected missing field named `max_speed_mps`",
         );
         refuse(HUSKY, "\"husky\"", "\"\"", "robot name is \"\", must be 1 to 64 characters");
     }

@@ -9,8 +9,13 @@ use sharp_sim::{
 };
 use sharp_space::Heading;
 
-fn robots() -> [RobotModel; 2] {
-    [RobotModel::husky(), RobotModel::limo()]
+/// Skid-steered, a car, round, and turning around its stern.
+fn robots() -> [RobotModel; 4] {
+    let tractor = "(footprint: \"[[-0.1,0.25],[-0.1,-0.25],[0.4,-0.25],[0.6,0.0],[0.4,0.25]]\", \
+                   drive: Differential(), max_speed_mps: 1.0)";
+    let tractor = RobotModel::from_ron_named(tractor, "tractor").expect("a robot");
+    let round = RobotModel::built_in("turtlebot3").expect("built in");
+    [RobotModel::husky(), RobotModel::limo(), round, tractor]
 }
 
 #[test]

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::distance_field::DistanceField;
-use crate::footprint::Footprint;
+use crate::footprint::{Footprint, FootprintShape, rectangle_corners};
 use crate::grid::{GridFrame, OccupancyGrid};
-use crate::pose::Pose;
+use crate::pose::{Pose, Vector};
 
 /// Decides which poses are free of collision. Implement [`is_free`](Self::is_free); the test of segments is
 /// provided. [`conformance::check_collision_checker`](crate::conformance::check_collision_checker) tests an
@@ -41,11 +41,11 @@ macro_rules! forward {
 
 forward!(&C, Box<C>, Arc<C>);
 
-/// Exact test of a rectangle against the blocked cells of a grid.
+/// Exact test of an outline against the blocked cells of a grid.
 ///
 /// A distance field decides the clear cases. Between the inscribed and the circumscribed radius, the
-/// rectangle is cut into grid rows, and prefix counts of blocked cells answer each row in constant time. A
-/// rectangle that only touches a cell's side counts as free.
+/// outline is cut into grid rows, and prefix counts of blocked cells answer each row in constant time. An
+/// outline that only touches a cell's side counts as free.
 #[derive(Clone, Debug)]
 pub struct FootprintChecker {
     footprint: Footprint,
@@ -94,9 +94,25 @@ impl FootprintChecker {
     #[must_use]
     pub fn is_free_exact(&self, pose: Pose) -> bool {
         let frame = self.field.frame();
-        let corners = self.footprint.corners(&pose).map(|corner| frame.to_grid(corner));
+        let place = |corner: Vector| frame.to_grid(pose.to_world(corner));
+        match self.footprint.shape() {
+            FootprintShape::Rectangle { half_length_m, half_width_m } => {
+                self.is_polygon_free(&rectangle_corners(half_length_m, half_width_m).map(place))
+            }
+            FootprintShape::Disc { radius_m } => {
+                self.is_disc_free(frame.to_grid(pose.position), radius_m / frame.resolution_m)
+            }
+            FootprintShape::Polygon { corners } => {
+                self.is_polygon_free(&corners.iter().map(|&corner| place(corner)).collect::<Vec<_>>())
+            }
+        }
+    }
+
+    /// Tests a convex polygon, in units of cells.
+    fn is_polygon_free(&self, corners: &[Vector]) -> bool {
+        let frame = self.field.frame();
         let (width, height) = (frame.width as f64, frame.height as f64);
-        let inside = |c: &crate::Vector| c.x >= 0.0 && c.y >= 0.0 && c.x <= width && c.y <= height;
+        let inside = |c: &Vector| c.x >= 0.0 && c.y >= 0.0 && c.x <= width && c.y <= height;
         if !corners.iter().all(inside) {
             return false;
         }
@@ -104,8 +120,28 @@ impl FootprintChecker {
         let high = corners.iter().map(|c| c.y).fold(f64::NEG_INFINITY, f64::max);
         let (first, last) = (low as usize, (high.ceil() as usize).min(frame.height));
         (first..last).all(|row| {
-            let (left, right) = span_in_strip(&corners, row as f64, row as f64 + 1.0);
+            let (left, right) = span_in_strip(corners, row as f64, row as f64 + 1.0);
             self.is_span_free(frame, row, left, right)
+        })
+    }
+
+    /// Tests a disc, in units of cells. In a strip it is widest where it is nearest to its centre.
+    fn is_disc_free(&self, center: Vector, radius: f64) -> bool {
+        let frame = self.field.frame();
+        let (width, height) = (frame.width as f64, frame.height as f64);
+        let inside = center.x >= radius
+            && center.y >= radius
+            && center.x + radius <= width
+            && center.y + radius <= height;
+        if !inside {
+            return false;
+        }
+        let (first, last) =
+            ((center.y - radius) as usize, ((center.y + radius).ceil() as usize).min(frame.height));
+        (first..last).all(|row| {
+            let nearest = center.y.clamp(row as f64, row as f64 + 1.0) - center.y;
+            let half = (radius * radius - nearest * nearest).max(0.0).sqrt();
+            self.is_span_free(frame, row, center.x - half, center.x + half)
         })
     }
 
@@ -130,7 +166,7 @@ impl CollisionChecker for FootprintChecker {
         if distance - 2.0 * half_diagonal > self.footprint.circumscribed_radius_m() {
             return true;
         }
-        if distance + half_diagonal < self.footprint.inscribed_radius_m() {
+        if distance + half_diagonal < self.footprint.inner_radius_m() {
             return false;
         }
         self.is_free_exact(pose)
@@ -138,14 +174,14 @@ impl CollisionChecker for FootprintChecker {
 }
 
 /// The x extent of a convex polygon inside the strip `y0..y1`; empty as `(∞, −∞)`.
-fn span_in_strip(corners: &[crate::Vector; 4], y0: f64, y1: f64) -> (f64, f64) {
+fn span_in_strip(corners: &[Vector], y0: f64, y1: f64) -> (f64, f64) {
     let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut include = |x: f64| {
         left = left.min(x);
         right = right.max(x);
     };
     for (i, a) in corners.iter().enumerate() {
-        let b = &corners[(i + 1) % 4];
+        let b = &corners[(i + 1) % corners.len()];
         if (y0..=y1).contains(&a.y) {
             include(a.x);
         }
@@ -205,7 +241,7 @@ mod tests {
             // A lattice of points 1 cm apart over the rectangle, border shrunk by a hair.
             (-59..=59).all(|i| {
                 (-19..=19).all(|j| {
-                    let point = pose.to_world(crate::Vector::new(f64::from(i) * 0.01, f64::from(j) * 0.01));
+                    let point = pose.to_world(Vector::new(f64::from(i) * 0.01, f64::from(j) * 0.01));
                     checker.field.frame().cell_at(point).is_some_and(|cell| checker.field.at(cell) > 0.0)
                 })
             })
@@ -217,6 +253,77 @@ mod tests {
                 assert!(grid_free(pose), "{pose:?} was called free");
             }
         }
+    }
+
+    /// Outlines that are no rectangle around the reference point.
+    fn other_outlines() -> [Footprint; 3] {
+        [
+            Footprint::disc(0.35).unwrap(),
+            Footprint::from_nav2("[[0.7, 0.0], [0.4, 0.25], [-0.15, 0.25], [-0.15, -0.25], [0.4, -0.25]]")
+                .unwrap(),
+            Footprint::from_nav2("[[0.2, 0.1], [0.2, -0.4], [-0.2, -0.4], [-0.2, 0.1]]").unwrap(),
+        ]
+    }
+
+    #[test]
+    fn discs_and_polygons_agree_with_an_exact_test_of_every_cell() {
+        for outline in other_outlines() {
+            let checker = room().with_footprint(outline);
+            let frame = checker.field.frame();
+            let blocked: Vec<Vector> = (0..frame.len())
+                .map(|index| frame.cell(index))
+                .filter(|&cell| checker.field.at(cell) <= 0.0)
+                .map(|cell| frame.center(cell).coords)
+                .collect();
+            let (mut free, mut near) = (0, 0);
+            arbtest::arbtest(|u| {
+                let mut coordinate =
+                    |max: f64| u.int_in_range(0..=100_000_u32).map(|i| f64::from(i) / 100_000.0 * max);
+                let pose = Pose::new(coordinate(6.0)? - 0.5, coordinate(4.0)? - 0.5, coordinate(6.3)?);
+                let answer = checker.is_free(pose);
+                assert_eq!(answer, checker.is_free_exact(pose), "{outline:?} at {pose:?}");
+                // Separating axes of a polygon and a square; the disc's polygon is inside the disc.
+                let corners: Vec<Vector> =
+                    outline.outline(&pose).iter().map(|corner| corner.coords).collect();
+                let gap_m = blocked
+                    .iter()
+                    .map(|center| gap_to_cell_m(&corners, center, frame.resolution_m))
+                    .fold(f64::INFINITY, f64::min);
+                let edge_m = corners
+                    .iter()
+                    .map(|c| c.x.min(c.y).min(frame.width_m() - c.x).min(frame.height_m() - c.y))
+                    .fold(gap_m, f64::min);
+                near += usize::from(edge_m.abs() < 0.2);
+                free += usize::from(answer);
+                assert!(
+                    !answer || edge_m > -1e-9,
+                    "{outline:?} at {pose:?} was called free, overlap {edge_m}"
+                );
+                // A hair more than a 48-gon lies inside its disc.
+                assert!(answer || edge_m < 1e-3, "{outline:?} at {pose:?} was called blocked, gap {edge_m}");
+                Ok(())
+            });
+            assert!(free > 0 && near > 0, "{outline:?}: {free} free, {near} near");
+        }
+    }
+
+    /// Width of the widest gap between a convex polygon and a cell along any of their normals; negative if they overlap.
+    fn gap_to_cell_m(corners: &[Vector], center: &Vector, side_m: f64) -> f64 {
+        let half = 0.5 * side_m;
+        let cell = [(half, half), (-half, half), (-half, -half), (half, -half)]
+            .map(|(x, y)| center + Vector::new(x, y));
+        let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+        let axes = sides.map(|(a, b)| (b - a).normalize()).map(|along| Vector::new(along.y, -along.x));
+        let axes = axes.chain([Vector::new(1.0, 0.0), Vector::new(0.0, 1.0)]);
+        let extent = |points: &[Vector], axis: &Vector| {
+            let along = points.iter().map(|point| point.dot(axis));
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)))
+        };
+        axes.map(|axis| {
+            let ((a, b), (c, d)) = (extent(corners, &axis), extent(&cell, &axis));
+            (c - b).max(a - d)
+        })
+        .fold(f64::NEG_INFINITY, f64::max)
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub trait RobotGeometry: CollisionChecker + Debug + Send + Sync {
     /// The distance from each cell to the nearest blocked one, metres.
     fn clearance(&self) -> &DistanceField;
 
-    /// The rectangle around the robot's outline. Its inscribed radius is the least clearance that planners
+    /// The robot's outline, or a rectangle around it. Its inscribed radius is the least clearance that planners
     /// expect the robot to need; with more than its circumscribed radius the robot is free at any heading.
     fn footprint(&self) -> &Footprint;
 
@@ -36,8 +36,7 @@ impl RobotGeometry for FootprintChecker {
 
     fn inflated(&self, margin_m: f64) -> Arc<dyn RobotGeometry> {
         let own = self.footprint();
-        let outline = Footprint::rectangle(own.half_length_m() + margin_m, own.half_width_m() + margin_m);
-        Arc::new(self.with_footprint(outline.unwrap_or(*own)))
+        Arc::new(self.with_footprint(own.grown(margin_m).unwrap_or(*own)))
     }
 }
 

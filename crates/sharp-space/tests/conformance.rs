@@ -39,6 +39,14 @@ fn the_footprint_checker_conforms() {
     assert_eq!(check_collision_checker(&checker, checker.field().frame().bounds()), Ok(()));
     assert_eq!(check_geometry(&checker), Ok(()));
     assert_eq!(check_geometry(&*checker.inflated(0.1)), Ok(()), "with a margin");
+    for outline in [
+        Footprint::disc(0.6).unwrap(),
+        Footprint::from_nav2("[[0.9, 0.0], [0.5, 0.4], [-0.2, 0.4], [-0.2, -0.4], [0.5, -0.4]]").unwrap(),
+    ] {
+        let other = checker.with_footprint(outline);
+        assert_eq!(check_geometry(&other), Ok(()), "{outline:?}");
+        assert_eq!(check_geometry(&*other.inflated(0.1)), Ok(()), "{outline:?} with a margin");
+    }
     assert_eq!(check_geometry(&Arc::new(checker)), Ok(()), "behind a pointer");
 }
 

@@ -31,7 +31,7 @@ pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failur
         })?);
     }
     let map = input::map(&args.map)?;
-    let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
+    let query = input::query(&map, &args.problem)?;
     let problem = NamedProblem::new(&map, query, &args.robot, &args.noise)?;
     let bar = spinner(kind.name());
     let monitor = CurveMonitor(args.tensorboard.as_deref().map(|root| Mutex::new(CurveFolder::new(root))));

@@ -1,4 +1,4 @@
-//! `sharp map info|check`: what a map file says, and whether a robot has room in it.
+//! `sharp map info|check|save`: what a map file says, whether a robot has room in it, and the same as a ROS map.
 
 use serde::Serialize;
 use sharp_bench::MapReport;
@@ -33,6 +33,13 @@ struct Check {
     components: usize,
     /// Share of the robot's free space that lies in components large enough for an abstract state.
     covered: f64,
+}
+
+#[derive(Serialize)]
+struct Saved {
+    schema: &'static str,
+    map: MapReport,
+    file: String,
 }
 
 pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
@@ -73,6 +80,23 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
                     100.0 * info.occupied,
                     100.0 * info.unknown,
                     info.problems
+                );
+            }
+            Ok(Exit::Done)
+        }
+        Map::Save { map, out } => {
+            let map = input::map(map)?;
+            sharp_maps::save_ros(&map.grid, out)?;
+            let (frame, file) = (map.grid.frame(), out.display().to_string());
+            if json {
+                let map = MapReport::new(&map.name, &map.grid);
+                say!("{}", to_json(&Saved { schema: "sharp.map.save/1", map, file }));
+            } else {
+                say!(
+                    "{}: {} x {} cells written to {file} and the PGM beside it",
+                    map.name,
+                    frame.width,
+                    frame.height
                 );
             }
             Ok(Exit::Done)

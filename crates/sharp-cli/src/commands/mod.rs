@@ -11,6 +11,7 @@ pub(crate) mod prior;
 pub(crate) mod regions;
 mod regions_score;
 mod regions_train;
+pub(crate) mod robot;
 pub(crate) mod run;
 pub(crate) mod serve;
 pub(crate) mod solve;

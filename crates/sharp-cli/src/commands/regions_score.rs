@@ -210,8 +210,14 @@ fn at_doors(
     doors: &Path,
     json: bool,
 ) -> Result<Exit, Failure> {
-    let map_args =
-        MapArgs { map: map.to_owned(), resolution: None, unknown: Unknown::Blocked, allow_outside: false };
+    let map_args = MapArgs {
+        map: map.to_owned(),
+        resolution: None,
+        unknown: Unknown::Blocked,
+        allow_outside: false,
+        keepout: vec![],
+        downsample: 1,
+    };
     let loaded = input::map(&map_args)?;
     let world = World::new(loaded.grid, robot);
     let (regions, source) = match &args.model {

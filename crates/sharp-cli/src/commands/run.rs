@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sharp_bench::{RunReport, clock_us, named, pictures};
 use sharp_export::driven_mcap;
 use sharp_maps::{LoadOptions, load};
-use sharp_plan::{Execution, Plan, RunSettings, record, run as run_plan, write_atomic};
+use sharp_plan::{Execution, Plan, RunSettings, Tour, record, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{Collisions, Run, Switch};
@@ -15,9 +15,9 @@ use crate::{input, progress};
 
 pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     let simulator = input::simulator(&args.simulator)?;
-    let plan = Arc::new(load_plan(&args.plan_dir)?);
-    let mut settings = RunSettings::new(&plan, args.episodes, Seed(seed));
-    settings.simulator = plan.world.simulator(simulator);
+    let tour = load_tour(&args.plan_dir)?;
+    let mut settings = tour.run_settings(args.episodes, Seed(seed));
+    settings.simulator = tour.plans[0].world.simulator(simulator);
     if let Some(noise) = &args.noise {
         settings.noise = named::noise(noise)?;
     }
@@ -25,13 +25,19 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     settings.contact_ends = args.collisions == Collisions::End;
 
     let spinner = progress::spinner("driving");
-    let episodes = match &args.record {
-        Some(file) => recorded(&plan, &settings, file)?,
-        None => run_plan(&plan, &settings, &clock_us()),
+    let episodes = match (&args.record, &tour.plans[..]) {
+        (None, _) => tour.run(&settings, &clock_us()),
+        (Some(file), [plan]) => recorded(plan, &settings, file)?,
+        (Some(_), plans) => {
+            let count = plans.len();
+            let message =
+                format!("--record: the plan has {count} goals in a row, expected one; record each goal-N");
+            return Err(Failure::new("USAGE", message));
+        }
     };
     spinner.finish_and_clear();
-    let report = RunReport::new(&plan, &episodes);
-    let picture = pictures::plan(&plan, &plan.solution.query, &episodes);
+    let report = RunReport::predicted(tour.predicted, &episodes);
+    let picture = pictures::tour(&tour, &episodes);
     pictures::write(&args.plan_dir, "run", &picture)?;
     write_atomic(&args.plan_dir.join("run.json"), (to_json(&report) + "\n").as_bytes())?;
     if json {
@@ -68,12 +74,28 @@ fn recorded(plan: &Arc<Plan>, settings: &RunSettings, file: &Path) -> Result<Vec
     Ok(recordings.into_iter().map(|recording| recording.execution).collect())
 }
 
-/// Reads the plan in `folder` with its map.
-pub(crate) fn load_plan(folder: &Path) -> Result<Plan, Failure> {
+/// Reads the plan or the plans in a row in `folder` with their map.
+pub(crate) fn load_tour(folder: &Path) -> Result<Tour, Failure> {
     let map = folder.join("map.yaml");
     let spec = map
         .to_str()
         .ok_or_else(|| Failure::new("FILE_INVALID", format!("{} is not printable", map.display())))?;
     let grid = load(spec, &LoadOptions::default())?.grid;
-    Ok(Plan::load(folder, grid)?)
+    Ok(Tour::load(folder, &grid)?)
+}
+
+/// Reads the plan of one goal in `folder` with its map.
+pub(crate) fn load_plan(folder: &Path) -> Result<Arc<Plan>, Failure> {
+    let plans = load_tour(folder)?.plans;
+    match &plans[..] {
+        [plan] => Ok(Arc::clone(plan)),
+        _ => {
+            let message = format!(
+                "{} has {} goals in a row, name one of its folders goal-N",
+                folder.display(),
+                plans.len()
+            );
+            Err(Failure::new("USAGE", message))
+        }
+    }
 }

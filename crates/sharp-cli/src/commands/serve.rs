@@ -1,16 +1,15 @@
 //! `sharp serve`: drives any robot or simulator from outside, one JSON line each way.
 
 use std::io::{BufRead, Write};
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sharp_drive::{Command, Controller, Decision, Motion};
-use sharp_plan::{ComposedPolicy, Plan};
+use sharp_plan::{Plan, Tour, TourPolicy};
 use sharp_sim::{ActionSettings, RobotState};
 use sharp_space::{Occupancy, Pose, Vector, trig};
 
 use crate::args::Serve;
-use crate::commands::run::load_plan;
+use crate::commands::run::load_tour;
 use crate::outcome::{Exit, Failure, to_json};
 
 #[derive(Deserialize)]
@@ -33,7 +32,8 @@ struct Reply<'a> {
 }
 
 pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
-    let plan = Arc::new(load_plan(&args.plan_dir)?);
+    let tour = load_tour(&args.plan_dir)?;
+    let plan = &tour.plans[0];
     let mut driver: Option<Served> = None;
     let mut out = std::io::stdout().lock();
     for (index, line) in std::io::stdin().lock().lines().enumerate() {
@@ -44,8 +44,8 @@ pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
         let reply = match parse(&line, index + 1) {
             Ok(request) => {
                 let state = state(&request, driver.as_ref().map(|served| &served.state));
-                if is_placed(&plan, &state.pose) {
-                    driver.get_or_insert_with(|| Served::new(&plan, state)).answer(state)
+                if is_placed(plan, &state.pose) {
+                    driver.get_or_insert_with(|| Served::new(&tour, state)).answer(state)
                 } else {
                     // What it knew of the robot before stays, for the next pose may be a real one again.
                     to_json(&Reply { waypoint: None, speed: 0.0, option: "", status: "lost" })
@@ -96,15 +96,15 @@ fn state(request: &Request, before: Option<&RobotState>) -> RobotState {
 
 /// A robot that is being driven.
 struct Served {
-    policy: ComposedPolicy,
+    policy: TourPolicy,
     state: RobotState,
     /// The last answer, until its outcome is known.
     pending: Option<Command>,
 }
 
 impl Served {
-    fn new(plan: &Arc<Plan>, state: RobotState) -> Self {
-        Self { policy: ComposedPolicy::new(Arc::clone(plan), state, true), state, pending: None }
+    fn new(tour: &Tour, state: RobotState) -> Self {
+        Self { policy: TourPolicy::new(tour.plans.clone(), state, true), state, pending: None }
     }
 
     /// What to do for a robot that is now in `state`.

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use sharp_bench::{NamedProblem, SolveReport, SolveSettings, Stopwatch, TimedMonitor, solve};
-use sharp_plan::Method;
+use sharp_bench::{NamedProblem, SolveReport, SolveSettings, Stopwatch, TimedMonitor, solve, solve_tour};
+use sharp_plan::{Method, Monitor};
+use sharp_space::Pose;
 
 use crate::args::{Guide, Solve, Switch};
-use crate::input;
+use crate::input::{self, HeadingRule};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{SolveMonitor, is_interrupted, spinner};
 
@@ -21,8 +22,12 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
         let message = format!("--failure-cost is {}, expected seconds, 0 or more", args.failure_cost);
         return Err(Failure::new("USAGE", message));
     }
+    if !(0.0..=1.0).contains(&args.min_success) {
+        let message = format!("--min-success is {}, expected a share from 0 to 1", args.min_success);
+        return Err(Failure::new("USAGE", message));
+    }
     let map = input::map(&args.map)?;
-    let query = input::query(&map, args.start.as_deref(), args.goal.as_deref(), args.problem)?;
+    let query = input::query(&map, &args.problem)?;
     let problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
     let settings = SolveSettings {
         abstraction: args.abstraction.request(),
@@ -33,26 +38,59 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     args.out.as_deref().map_or(Ok(()), input::check_out)?;
     let library = input::library(args.library.as_deref());
 
+    let vias = args.via.iter().map(|via| input::pose("--via", via, HeadingRule::Free));
+    let vias = vias.collect::<Result<Vec<Pose>, _>>()?;
+
     let spinner = SolveMonitor::new(spinner("searching"), args.tensorboard.as_deref());
     let monitor = TimedMonitor::new(stopwatch, time_limit, &spinner);
-    let mut solved = solve(&problem, &settings, library.as_deref(), &monitor)?;
-    spinner.finish();
-
-    if solved.plan.is_some() {
-        let folder = plan_folder(args, &problem)?;
-        solved.write(&folder, &folder)?;
-    }
-    solved.save_library()?;
-    if json {
-        say!("{}", to_json(&solved.report));
+    let (report, is_time_up) = if vias.is_empty() {
+        let mut solved = solve(&problem, &settings, library.as_deref(), &monitor)?;
+        let is_time_up = monitor.should_stop();
+        spinner.finish();
+        hold_to(&mut solved.report, args.min_success);
+        if solved.plan.is_some() {
+            let folder = plan_folder(args, &problem)?;
+            solved.write(&folder, &folder)?;
+        }
+        solved.save_library()?;
+        (solved.report, is_time_up)
     } else {
-        print_report(&solved.report);
+        let goals = [vias, vec![query.goal]].concat();
+        let mut solved = solve_tour(&problem, &goals, &settings, library.as_deref(), &monitor)?;
+        let is_time_up = monitor.should_stop();
+        spinner.finish();
+        hold_to(&mut solved.report, args.min_success);
+        if solved.tour.is_some() {
+            let folder = plan_folder(args, &problem)?;
+            solved.write(&folder, &folder)?;
+        }
+        (solved.report, is_time_up)
+    };
+    if is_time_up && report.predicted.is_some() && !is_interrupted() {
+        eprintln!("warning: time was up before the search was done, this is the best plan so far");
     }
-    Ok(match solved.plan {
-        Some(_) => Exit::Done,
-        None if is_interrupted() => Exit::Interrupted,
-        None => Exit::No,
+    if json {
+        say!("{}", to_json(&report));
+    } else {
+        print_report(&report);
+    }
+    Ok(match report.status {
+        _ if is_interrupted() => Exit::Interrupted,
+        "solved" => Exit::Done,
+        _ => Exit::No,
     })
+}
+
+/// Says so if the plan predicts less success than is wanted.
+fn hold_to(report: &mut SolveReport, min_success: f64) {
+    if let Some(predicted) = report.predicted.filter(|predicted| predicted.success < min_success) {
+        report.status = "below_min_success";
+        report.reason = Some(format!(
+            "the best plan found succeeds in {:.1} %, less than the {:.1} % of --min-success",
+            100.0 * predicted.success,
+            100.0 * min_success
+        ));
+    }
 }
 
 fn limit(seconds: f64) -> Result<Duration, Failure> {
@@ -84,7 +122,7 @@ fn plan_folder(args: &Solve, problem: &NamedProblem) -> Result<PathBuf, Failure>
     if let Some(folder) = &args.out {
         return Ok(folder.clone());
     }
-    let number = args.problem.map_or(String::new(), |number| format!("-p{number}"));
+    let number = args.problem.problem.map_or(String::new(), |number| format!("-p{number}"));
     let kind = sharp_options::OptionKind::from(args.abstraction.options).name();
     let stem = format!("{}{number}-{}-{kind}", problem.map, problem.world.robot.name);
     let root = Path::new("sharp-plans");
@@ -114,7 +152,13 @@ fn print_report(report: &SolveReport) {
     if let Some(reason) = &report.reason {
         say!("{reason}");
     }
-    for option in &report.plan {
+    let ends: Vec<usize> =
+        report.goals.iter().scan(0, |end, goal| Some(std::mem::replace(end, *end + goal.legs))).collect();
+    for (index, option) in report.plan.iter().enumerate() {
+        if let Some(number) = ends.iter().position(|&first| first == index) {
+            let [x, y] = report.goals[number].goal;
+            say!("to ({x}, {y}):");
+        }
         say!(
             "  {:<14} {:>5.1} m  time {:>5} s  cost {:>6.1} s  succeeds {:>4}/{:<4} on arrival  {}{}",
             option.option,

@@ -192,7 +192,7 @@ impl Scene<'_> {
         let (Some(trajectory), Some(footprint)) = (self.trajectories.first(), self.footprint) else { return };
         let mut path = String::new();
         for pose in spaced(&trajectory.poses, FOOTPRINT_SPACING_M) {
-            let corners = footprint.corners(pose).map(|corner| xy(self.view.cells(corner)));
+            let corners = footprint.outline(pose).into_iter().map(|corner| xy(self.view.cells(corner)));
             path += &PathData::polyline(corners).close().finish();
             let ahead = pose.to_world(Vector::new(footprint.half_length_m(), 0.0));
             let nose = [pose.position, ahead].map(|point| xy(self.view.cells(point)));

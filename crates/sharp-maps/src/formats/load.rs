@@ -1,9 +1,10 @@
 //! From what the user typed to a grid. Content and ending of the file decide what kind of map it is.
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use sharp_space::{OccupancyGrid, Pose};
+use sharp_space::{Cell, GridFrame, OccupancyGrid, Point, Pose};
 
 use super::error::MapError;
 use super::files::{self, FileKind};
@@ -48,6 +49,19 @@ pub struct MapFile {
     pub problems: Vec<Problem>,
     /// What was accepted but is probably a mistake, one sentence each.
     pub warnings: Vec<String>,
+    /// The cells as they were read, whatever was done to the grid since: pixels are counted in them.
+    pub picture: GridFrame,
+}
+
+impl MapFile {
+    /// The place of the middle of a pixel, counted from the upper left corner of the picture that was read; `None`
+    /// outside.
+    #[must_use]
+    pub fn pixel(&self, col: usize, row: usize) -> Option<Point> {
+        let frame = &self.picture;
+        let inside = col < frame.width && row < frame.height;
+        inside.then(|| frame.center(Cell::new(col, frame.height - 1 - row)))
+    }
 }
 
 /// Reads the map that `spec` names: an own environment (see [`named_maps`](crate::named_maps)) or
@@ -88,7 +102,19 @@ fn load_file(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
         warnings.push(format!("{spec}: states its own resolution, the given one is not used"));
     }
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok(MapFile { name, grid, problems: Vec::new(), warnings })
+    let picture = *grid.frame();
+    Ok(MapFile { name, grid, problems: Vec::new(), warnings, picture })
+}
+
+/// The ROS map beside `image` that has the same stem and names it.
+fn described_by(image: &Path) -> Option<PathBuf> {
+    let named = |yaml: &PathBuf| ros::image_of(yaml).is_some_and(|named| is_same_file(&named, image));
+    ["yaml", "yml"].map(|ending| image.with_extension(ending)).into_iter().find(named)
+}
+
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let real = |path: &Path| fs::canonicalize(path).ok();
+    real(a).is_some_and(|a| real(b).is_some_and(|b| a == b))
 }
 
 /// Images and `MovingAI` maps: files that hold the cells themselves.
@@ -100,7 +126,12 @@ fn load_cells(
 ) -> Result<OccupancyGrid, MapError> {
     let bytes = files::read(Path::new(spec), FileKind::Cells)?;
     if picture::is_picture(&bytes) {
-        let expected = "given in metres a pixel, as a plain image does not state it";
+        if let (None, Some(yaml)) = (options.resolution_m, described_by(Path::new(spec))) {
+            warnings.push(format!("{spec}: read as {} beside it says", yaml.display()));
+            return ros::load(&yaml, options, warnings);
+        }
+        let expected =
+            "given in metres a pixel, as a plain image does not state it and no .yaml beside it does";
         let resolution_m =
             options.resolution_m.ok_or_else(|| MapError::field(spec, "resolution", "missing", expected))?;
         let picture = picture::decode(spec, &bytes)?;

@@ -1,6 +1,7 @@
 //! Map files: one module per format, and the environments that come with the crate.
 
 mod doors;
+mod edit;
 mod error;
 mod files;
 mod floor_plan;
@@ -10,6 +11,7 @@ mod named;
 mod picture;
 mod ros;
 mod save;
+mod scenario;
 
 #[cfg(test)]
 mod drivable;
@@ -21,3 +23,4 @@ pub use error::MapError;
 pub use load::{LoadOptions, MapFile, Problem, load};
 pub use named::named_maps;
 pub use save::save_ros;
+pub use scenario::{MovingAiProblem, load_scenario};

@@ -43,7 +43,8 @@ fn read(name: &str, plan: &str, problems: &str) -> Result<MapFile, MapError> {
     let problems: Vec<Problem> = ron::from_str(problems)
         .map_err(|e| MapError::syntax(&file, format!("is no list of problems: {e}")))?;
     let grid = floor_plan::parse(&format!("{name}.ron"), plan)?;
-    Ok(MapFile { name: name.to_owned(), grid, problems, warnings: Vec::new() })
+    let picture = *grid.frame();
+    Ok(MapFile { name: name.to_owned(), grid, problems, warnings: Vec::new(), picture })
 }
 
 #[cfg(test)]

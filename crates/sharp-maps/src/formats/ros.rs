@@ -114,6 +114,14 @@ pub(crate) fn load(
     to_grid(&file, &picture, &description)
 }
 
+/// The image that the YAML file at `path` names, if it is a sound description of a map.
+pub(crate) fn image_of(path: &Path) -> Option<PathBuf> {
+    let file = path.display().to_string();
+    let bytes = files::read(path, FileKind::Text).ok()?;
+    let description = describe(&file, files::as_text(&file, &bytes).ok()?).ok()?;
+    Some(path.parent()?.join(description.image))
+}
+
 /// A warning if the grey that map savers write for unknown cells is there and counts as free.
 fn unknown_as_free(file: &str, picture: &GreyImage, rules: &GreyRules) -> Option<String> {
     let counts_as_free = rules.mode != GreyMode::Raw && !rules.negate && rules.value_of(UNKNOWN_GREY) == 0;

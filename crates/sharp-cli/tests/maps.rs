@@ -1,0 +1,133 @@
+//! Maps and the places on them as a user gives them: saved, masked, coarser, by pixel, by scenario; goals in a row.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn sharp(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sharp"))
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .expect("the binary runs")
+}
+
+fn json(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    serde_json::from_str(&text)
+        .unwrap_or_else(|e| panic!("{e} in {text:?}, {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A hall of 12 m x 6 m with a border, 0.1 m a cell; `wall` says which columns are a wall.
+fn write_hall(folder: &Path, name: &str, wall: std::ops::Range<usize>) {
+    let (width, height) = (120, 60);
+    let mut pixels = format!("P5\n{width} {height}\n255\n").into_bytes();
+    for row in 0..height {
+        for col in 0..width {
+            let border = row == 0 || col == 0 || row == height - 1 || col == width - 1;
+            pixels.push(if border || wall.contains(&col) { 0 } else { 254 });
+        }
+    }
+    fs::write(folder.join(format!("{name}.pgm")), pixels).expect("a file");
+    let yaml = format!(
+        "image: {name}.pgm\nresolution: 0.1\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    );
+    fs::write(folder.join(format!("{name}.yaml")), yaml).expect("a file");
+}
+
+const QUICK: [&str; 6] = ["--regions", "geometric", "--library", "none", "--learning", "prior"];
+
+#[test]
+fn a_saved_map_is_the_same_map_and_an_image_finds_its_description() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_hall(folder.path(), "hall", 0..0);
+    let hash =
+        |map: &str| json(&sharp(folder.path(), &["map", "info", map, "--json"]))["map"]["hash"].clone();
+    for map in ["a", "hall.yaml"] {
+        let saved = sharp(folder.path(), &["map", "save", map, "--out", "copy.yaml", "--json"]);
+        assert_eq!(json(&saved)["schema"], "sharp.map.save/1", "{}", said(&saved));
+        assert_eq!(hash("copy.yaml"), hash(map), "{map}");
+    }
+    let output = sharp(folder.path(), &["map", "info", "hall.pgm", "--json"]);
+    assert_eq!(json(&output)["map"]["hash"], hash("hall.yaml"));
+    assert!(said(&output).contains("hall.yaml beside it"), "{}", said(&output));
+}
+
+#[test]
+fn a_keepout_mask_is_a_wall_and_coarse_cells_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_hall(folder.path(), "hall", 0..0);
+    write_hall(folder.path(), "mask", 55..60);
+    let args = ["solve", "hall.yaml", "--start", "1,5,0", "--goal", "9,5", "--out", "p", "--json"];
+    let with_mask = sharp(folder.path(), &[&args[..], &QUICK, &["--keepout", "mask.yaml"]].concat());
+    assert_eq!(with_mask.status.code(), Some(1), "{}", said(&with_mask));
+    assert!(
+        json(&with_mask)["reason"].as_str().is_some_and(|r| r.contains("separate parts")),
+        "no way across"
+    );
+    let coarse = sharp(folder.path(), &["map", "info", "hall.yaml", "--downsample", "7", "--json"]);
+    assert_eq!((&json(&coarse)["width"], &json(&coarse)["height"]), (&18.into(), &9.into()));
+    assert!(said(&coarse).contains("passages"), "{}", said(&coarse));
+}
+
+#[test]
+fn places_are_told_by_pixel_and_by_scenario() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_hall(folder.path(), "hall", 0..0);
+    // The middle of pixel (20, 29) from the upper left, in a map whose lower left corner is (-1, 2).
+    let args =
+        ["solve", "hall.yaml", "--start-pixel", "20,29", "--goal-pixel", "90,29", "--out", "p", "--json"];
+    let solved = json(&sharp(folder.path(), &[&args[..], &QUICK].concat()));
+    let length_m: f64 =
+        solved["plan"].as_array().expect("a plan").iter().filter_map(|leg| leg["length_m"].as_f64()).sum();
+    assert!((6.4..7.6).contains(&length_m), "from (1.05, 5.05) to (8.05, 5.05): {length_m} m");
+    for (pixel, word) in [("120,5", "below 120"), ("5", "C,R"), ("5,5,1", "C,R"), ("-1,2", "below")] {
+        let args = ["solve", "hall.yaml", "--start", "1,5,0", "--goal-pixel"];
+        let flag = format!("{}={pixel}", args[4]);
+        let refused = sharp(folder.path(), &[&args[..4], &[flag.as_str()]].concat());
+        assert!(
+            refused.status.code() == Some(2) && said(&refused).contains(word),
+            "{pixel}: {}",
+            said(&refused)
+        );
+    }
+    let map: String = std::iter::repeat_n(".".repeat(12), 6).map(|row| row + "\n").collect();
+    fs::write(folder.path().join("open.map"), format!("type octile\nheight 6\nwidth 12\nmap\n{map}"))
+        .expect("a file");
+    let scenarios = "version 1\n0\topen.map\t12\t6\t1\t1\t2\t1\t1\n2\topen.map\t12\t6\t2\t3\t9\t3\t7\n";
+    fs::write(folder.path().join("open.scen"), scenarios).expect("a file");
+    let args = ["solve", "open.map", "--scen", "open.scen", "--out", "q", "--json", "--problem"];
+    let solved = json(&sharp(folder.path(), &[&args[..], &["2"], &QUICK].concat()));
+    assert_eq!(solved["status"], "solved", "{solved}");
+    let refused = sharp(folder.path(), &[&args[..], &["3"]].concat());
+    assert!(refused.status.code() == Some(2) && said(&refused).contains("1 to 2"), "{}", said(&refused));
+}
+
+#[test]
+fn goals_in_a_row_are_solved_run_and_served_as_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_hall(folder.path(), "hall", 0..0);
+    let args =
+        ["solve", "hall.yaml", "--start", "1,4,0", "--via", "9,4", "--goal", "2,6.5", "--out", "p", "--json"];
+    let solved = json(&sharp(folder.path(), &[&args[..], &QUICK].concat()));
+    assert_eq!(solved["status"], "solved", "{solved}");
+    let goals = solved["goals"].as_array().expect("goals");
+    assert_eq!((goals.len(), &goals[1]["goal"]), (2, &serde_json::json!([2.0, 6.5])));
+    let predicted = solved["predicted"]["success"].as_f64().expect("a prediction");
+    assert!(predicted > 0.9, "an open hall: {predicted}");
+    let run = json(&sharp(folder.path(), &["run", "p", "--episodes", "20", "--json"]));
+    assert!(run["successes"].as_u64().is_some_and(|count| count >= 17), "{run}");
+    assert!(run["mean_path_m"].as_f64().is_some_and(|m| m > 14.0), "both goals: {run}");
+    let wanted = [&args[..9], &["q", "--min-success", "1", "--noise", "harsh", "--json"], &QUICK].concat();
+    let output = sharp(folder.path(), &wanted);
+    if json(&output)["predicted"]["success"].as_f64().is_some_and(|success| success < 1.0) {
+        assert_eq!((output.status.code(), &json(&output)["status"]), (Some(1), &"below_min_success".into()));
+        assert!(folder.path().join("q/tour.ron").exists(), "the plan is written all the same");
+    }
+}

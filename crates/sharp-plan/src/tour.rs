@@ -1,0 +1,320 @@
+//! Several goals in a row: one plan for each, driven one after the other.
+//!
+//! Each plan begins where the guide of the one before it ends, so a robot that has reached a goal drives on to that place.
+//! Where it comes to stand elsewhere, the way from there is planned anew. How often the whole succeeds is counted on fresh
+//! runs from the first start to the last goal.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sharp_drive::{
+    Controller, Decision, Episode, EpisodeEnd, EpisodeRules, Motion, SuccessCount, SuccessEstimate,
+    Supervisor, TIME_LIMIT_MIN_S,
+};
+use sharp_guide::GuidedOption;
+use sharp_sim::{RobotState, Simulator};
+use sharp_space::{OccupancyGrid, Pose, Seed};
+
+use crate::composed::{ComposedPolicy, Events};
+use crate::execute::{Execution, RunSettings, TIME_LIMIT_FACTOR};
+use crate::files::{self, FileError};
+use crate::plan_file::Plan;
+
+const TOUR_FILE: &str = "tour.ron";
+/// A robot drives on to the end of the guide after it has reached a goal that is not the last, until it is this near, metres,
+/// or gets no nearer, or for so many actions: the next plan begins there.
+const END_WITHIN_M: f64 = 0.1;
+const ACTIONS_TO_END_MAX: u32 = 8;
+/// Where it is then nearer to the start of the next plan than this, metres and radians, that plan holds as it is.
+const START_WITHIN: (f64, f64) = (0.25, 0.4);
+/// Most runs that a prediction is counted on: each plans anew at every goal, which takes far longer than driving.
+const VERIFIED_MAX: u32 = 200;
+/// More plans in a row are a broken file.
+const PLANS_MAX: usize = 1000;
+
+/// Plans that are driven one after the other, at least one.
+#[derive(Clone, Debug)]
+pub struct Tour {
+    /// The plans, each from where the one before it ends.
+    pub plans: Vec<Arc<Plan>>,
+    /// Fresh runs through all of them, without recovery and without contact.
+    pub predicted: SuccessCount,
+    /// Mean simulated time of the successful ones, seconds; 0 without any.
+    pub predicted_time_s: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TourFile {
+    plans: usize,
+    predicted: SuccessCount,
+    predicted_time_s: f64,
+}
+
+impl From<Arc<Plan>> for Tour {
+    fn from(plan: Arc<Plan>) -> Self {
+        let (predicted, predicted_time_s) = (plan.solution.predicted, plan.solution.predicted_time_s);
+        Self { plans: vec![plan], predicted, predicted_time_s }
+    }
+}
+
+impl Tour {
+    /// Runs `plans` from end to end in forks of `simulator`, as many times as their method verifies plans, at most 200.
+    ///
+    /// # Panics
+    /// If there is no plan.
+    #[must_use]
+    pub fn verified(plans: Vec<Arc<Plan>>, simulator: &dyn Simulator) -> Self {
+        let first = plans.first().expect("a tour has a plan");
+        let settings = RunSettings {
+            episodes: first.method.verify_episodes.min(VERIFIED_MAX),
+            simulator: simulator.fork(),
+            noise: first.noise.clone(),
+            recovery: false,
+            contact_ends: true,
+            time_limit_s: f64::INFINITY,
+            seed: first.seed.child("tour", plans.len() as u64),
+        };
+        let tour = Self { plans, predicted: SuccessCount::default(), predicted_time_s: 0.0 };
+        let runs = tour.drive(&settings, EpisodeRules::default(), &|| 0.0);
+        let runs = runs.iter().map(|run| (run.end == EpisodeEnd::Reached, run.record.time_s));
+        let SuccessEstimate { count, mean_time_s } = SuccessEstimate::of(runs);
+        let predicted_time_s = if mean_time_s.is_finite() { mean_time_s } else { 0.0 };
+        Self { predicted: count, predicted_time_s, ..tour }
+    }
+
+    /// `episodes` of the tour as the project measures them: see [`RunSettings::new`].
+    #[must_use]
+    pub fn run_settings(&self, episodes: u32, seed: Seed) -> RunSettings {
+        let time_limit_s = (TIME_LIMIT_FACTOR * self.predicted_time_s).max(TIME_LIMIT_MIN_S);
+        RunSettings { time_limit_s, ..RunSettings::new(&self.plans[0], episodes, seed) }
+    }
+
+    /// Runs the tour; `clock_us` tells the wall time in microseconds. Executions come in order.
+    #[must_use]
+    pub fn run(&self, settings: &RunSettings, clock_us: &(dyn Fn() -> f64 + Sync)) -> Vec<Execution> {
+        let rules = EpisodeRules::default()
+            .with_contact_ends(settings.contact_ends)
+            .with_time_limit_s(settings.time_limit_s)
+            .with_trace();
+        self.drive(settings, rules, clock_us)
+    }
+
+    fn drive(
+        &self,
+        settings: &RunSettings,
+        rules: EpisodeRules,
+        clock_us: &(dyn Fn() -> f64 + Sync),
+    ) -> Vec<Execution> {
+        let first = &self.plans[0];
+        let vehicle = first.world.vehicle(&*settings.simulator, &settings.noise, settings.contact_ends);
+        let episode = Episode::new(vehicle, rules);
+        let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
+        let start = RobotState::at_rest(first.solution.query.start);
+        let execute = |number: u32| {
+            let mut episode = episode.clone();
+            episode.begin(start, settings.seed, u64::from(number));
+            let mut policy = TourPolicy::new(self.plans.clone(), start, settings.recovery);
+            let end = episode.drive(&mut policy, &supervisor);
+            Execution { end, record: episode.into_record(), events: policy.events() }
+        };
+        (0..settings.episodes).into_par_iter().map(execute).collect()
+    }
+
+    /// The folder of plan number `index` of the tour in `folder`.
+    #[must_use]
+    pub fn plan_folder(folder: &Path, index: usize) -> PathBuf {
+        folder.join(format!("goal-{}", index + 1))
+    }
+
+    /// Writes what is not in the plans' own folders into `folder`.
+    ///
+    /// # Errors
+    /// Returns an error that names the file that could not be written.
+    pub fn save(&self, folder: &Path) -> Result<(), FileError> {
+        let Self { plans, predicted, predicted_time_s } = self;
+        let (predicted, predicted_time_s) = (*predicted, *predicted_time_s);
+        let file = TourFile { plans: plans.len(), predicted, predicted_time_s };
+        files::write_ron(&folder.join(TOUR_FILE), &file)
+    }
+
+    /// Reads the plan or the tour in `folder`, made in `grid`.
+    ///
+    /// # Errors
+    /// Returns an error that names the file that is missing, damaged, of another format or for another map.
+    pub fn load(folder: &Path, grid: &OccupancyGrid) -> Result<Self, FileError> {
+        let path = folder.join(TOUR_FILE);
+        if !path.exists() {
+            return Ok(Arc::new(Plan::load(folder, grid.clone())?).into());
+        }
+        let TourFile { plans, predicted, predicted_time_s } = files::read_ron(&path)?;
+        if !(1..=PLANS_MAX).contains(&plans) {
+            return Err(FileError::content(&path, format!("plans is {plans}, expected 1 to {PLANS_MAX}")));
+        }
+        let load = |index| Plan::load(&Self::plan_folder(folder, index), grid.clone()).map(Arc::new);
+        let plans = (0..plans).map(load).collect::<Result<_, _>>()?;
+        Ok(Self { plans, predicted, predicted_time_s })
+    }
+}
+
+/// Where a plan that follows `plan` begins: at the end of its last guide.
+#[must_use]
+pub fn end_of(plan: &Plan) -> Pose {
+    let last = plan.solution.steps.last().and_then(|step| step.option.guide.poses().last().copied());
+    last.unwrap_or(plan.solution.query.start)
+}
+
+/// A tour that is being driven: the policy of one plan after the other.
+pub struct TourPolicy {
+    /// The plans that come after the one that runs, the next one last.
+    to_come: Vec<Arc<Plan>>,
+    current: ComposedPolicy,
+    recovery: bool,
+    /// What went otherwise than planned in the plans before.
+    before: Events,
+    /// Actions since the present goal was reached, and the least distance from the end of the guide, metres.
+    since_reached: (u32, f64),
+}
+
+impl fmt::Debug for TourPolicy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TourPolicy").field("to_come", &self.to_come.len()).finish_non_exhaustive()
+    }
+}
+
+impl TourPolicy {
+    /// The policy of `plans` for a robot in `state`.
+    ///
+    /// # Panics
+    /// If there is no plan.
+    #[must_use]
+    pub fn new(mut plans: Vec<Arc<Plan>>, state: RobotState, recovery: bool) -> Self {
+        plans.reverse();
+        let first = plans.pop().expect("a tour has a plan");
+        let current = ComposedPolicy::new(first, state, recovery);
+        Self {
+            to_come: plans,
+            current,
+            recovery,
+            before: Events::default(),
+            since_reached: (0, f64::INFINITY),
+        }
+    }
+
+    /// The option that is running.
+    #[must_use]
+    pub fn option(&self) -> &GuidedOption {
+        self.current.option()
+    }
+
+    /// Whether a robot that has reached its present goal still comes nearer to the end of the guide.
+    fn is_nearing_the_end(&mut self) -> bool {
+        let end = self.current.option().guide.end();
+        let off_m = self.current.observation().state.pose.distance_m(&end);
+        let (actions, least_m) = self.since_reached;
+        self.since_reached = (actions + 1, off_m.min(least_m));
+        off_m > END_WITHIN_M && off_m < least_m && actions < ACTIONS_TO_END_MAX
+    }
+
+    /// Goals that come after the present one.
+    #[must_use]
+    pub const fn goals_to_come(&self) -> usize {
+        self.to_come.len()
+    }
+
+    /// Returns true if the last decision came with a new plan.
+    #[must_use]
+    pub const fn is_recovering(&self) -> bool {
+        self.current.is_recovering()
+    }
+
+    /// What went otherwise than planned so far.
+    #[must_use]
+    pub const fn events(&self) -> Events {
+        let now = self.current.events();
+        Events {
+            strays: self.before.strays + now.strays,
+            recoveries: self.before.recoveries + now.recoveries,
+        }
+    }
+}
+
+impl Controller for TourPolicy {
+    fn decide(&mut self) -> Decision {
+        loop {
+            let decision = self.current.decide();
+            if decision != Decision::Reached {
+                return decision;
+            }
+            let Some(next) = self.to_come.last().cloned() else { return decision };
+            if self.is_nearing_the_end() {
+                return self.current.drive();
+            }
+            self.to_come.pop();
+            self.before = self.events();
+            self.since_reached = (0, f64::INFINITY);
+            let state = self.current.observation().state;
+            let start = next.solution.query.start;
+            let (within_m, within_rad) = START_WITHIN;
+            let is_there = state.pose.distance_m(&start) < within_m
+                && state.pose.heading.turn_to(start.heading).abs() < within_rad;
+            let begin = if is_there { ComposedPolicy::new } else { ComposedPolicy::arriving };
+            self.current = begin(next, state, self.recovery);
+        }
+    }
+
+    fn observe(&mut self, motion: &Motion) {
+        self.current.observe(motion);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_options::OptionKind;
+    use sharp_sim::SimulatorKind;
+
+    use super::*;
+    use crate::execute::success;
+    use crate::test_worlds::plan;
+
+    fn twice() -> Tour {
+        // Both drive the same way: after the first, the robot has to come back to the start of the guide.
+        let plan = plan(OptionKind::Centroid);
+        let simulator = plan.world.simulator(SimulatorKind::Kinematic);
+        let mut short = (*plan).clone();
+        short.method = short.method.with_episodes(50, 50, 50);
+        Tour::verified(vec![Arc::new(short), plan], &*simulator)
+    }
+
+    #[test]
+    fn one_plan_is_a_tour_that_runs_as_the_plan_does() {
+        let plan = plan(OptionKind::Interface);
+        let settings = RunSettings::new(&plan, 5, Seed(3));
+        let alone = crate::execute::run(&plan, &settings, &|| 0.0);
+        let tour = Tour::from(plan);
+        let same = tour.run(&tour.run_settings(5, Seed(3)), &|| 0.0);
+        let traces = |runs: &[Execution]| runs.iter().map(|run| run.record.trace.clone()).collect::<Vec<_>>();
+        assert_eq!(traces(&alone), traces(&same));
+    }
+
+    #[test]
+    fn the_second_plan_begins_where_the_first_ends() {
+        let tour = twice();
+        assert_eq!(
+            tour.predicted,
+            SuccessCount { episodes: 50, successes: 50 },
+            "as many runs as the method says"
+        );
+        let runs = tour.run(&tour.run_settings(3, Seed(1)), &|| 0.0);
+        let alone = Tour::from(Arc::clone(&tour.plans[0])).run(&tour.run_settings(3, Seed(1)), &|| 0.0);
+        assert_eq!(success(&alone).successes, 3, "one plan holds without noise");
+        for (run, alone) in runs.iter().zip(&alone) {
+            let shared = alone.record.trace.len();
+            assert!(run.record.trace.len() >= shared, "it goes on where one plan ends");
+            assert_eq!(run.record.trace[..shared], alone.record.trace[..], "the same first part");
+        }
+    }
+}
