@@ -200,7 +200,9 @@ impl<'a> Search<'a> {
         };
         let bypass_s = if option.is_bypass { settings.bypass_surcharge_s } else { 0.0 };
         let measured = measured.filter(|_| settings.cost_update);
-        let surcharge_s = if measured.is_some() { 0.0 } else { settings.untrained_surcharge_s };
+        // The direct way serves no later problem; it is there to be compared with as it is.
+        let is_bare = measured.is_some() || id == LegId::Direct;
+        let surcharge_s = if is_bare { 0.0 } else { settings.untrained_surcharge_s };
         let cost_s = match self.guided.get(&option.id()) {
             Some(Ok(_)) => {
                 let cost_s = self.pricer.cost_s(&self.prices[&option.id()], measured.as_ref());

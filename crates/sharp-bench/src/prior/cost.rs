@@ -5,25 +5,18 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sharp_drive::{CostModel, DriveRow, Prior, RiskSamples, SuccessEstimate, TimeSamples};
 use sharp_plan::TrainingRoute;
-use sharp_rl::{FitError, FitSettings, Mlp, Scratch, StoreError, fit};
+use sharp_rl::{FitError, FitSettings, Mlp, StoreError, fit};
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::Seed;
 use thiserror::Error;
 
 use super::courses::PriorCourses;
 
-/// Places with a higher risk are left out of the calibration, failures a pass: few of them outweigh all others.
-const CALIBRATED_RISK: f32 = 0.01;
-/// Times that each held-out route is driven for the calibration.
-const CALIBRATION_DRIVES: u64 = 6;
-
 /// How a cost model is fitted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CostRecipe {
-    /// Generated maps to fit to.
+    /// Generated maps.
     pub map_count: u32,
-    /// Generated maps of held-out kinds that the risk is calibrated on.
-    pub calibration_maps: u32,
     /// Times that each route is driven, each time under another noise and at another caution.
     pub drives: u64,
     /// Episodes of such a drive.
@@ -42,7 +35,6 @@ impl CostRecipe {
     pub const fn shipped() -> Self {
         Self {
             map_count: 480,
-            calibration_maps: 120,
             drives: 16,
             episodes: 12,
             hidden: [64, 64],
@@ -56,7 +48,6 @@ impl CostRecipe {
     pub const fn tiny() -> Self {
         Self {
             map_count: 24,
-            calibration_maps: 8,
             drives: 6,
             episodes: 8,
             hidden: [32, 32],
@@ -89,8 +80,6 @@ pub struct FittedCost {
     pub failures: f64,
     /// The mean loss of each epoch of the risks.
     pub losses: Vec<f64>,
-    /// What the risk was multiplied by after the fit, so that it is right for kinds of map that were not fitted to.
-    pub risk_factor: f64,
 }
 
 /// Fits the cost model of `prior` for `robot`. Equal recipes and seeds give equal bytes on one kind of processor.
@@ -112,39 +101,9 @@ pub fn fit_cost(
     fit(&mut time, &TimeSamples(&rows), &recipe.time_fit, rng)?;
     let mut risk = Mlp::new(&[CostModel::INPUTS, first, second, 1], rng);
     let losses = fit(&mut risk, &RiskSamples(&rows), &recipe.risk_fit, rng)?;
-    let mut network = time.beside(&risk).expect("both have the same inputs and as many layers");
+    let network = time.beside(&risk).expect("both have the same inputs and as many layers");
     let failures = rows.iter().map(|row| f64::from(row.failures)).sum();
-    let risk_factor = calibrate(&mut network, (robot, prior, recipe, seed.child("calibration", 0)), on_map);
-    Ok(FittedCost { model: CostModel::new(network)?, rows: rows.len(), failures, losses, risk_factor })
-}
-
-/// Multiplies the risk that `network` says by a factor, so that it is right in sum on kinds of map that it was not
-/// fitted to; returns the factor.
-fn calibrate(
-    network: &mut Mlp,
-    (robot, prior, recipe, seed): (&RobotModel, &Prior, &CostRecipe, Seed),
-    on_map: &(dyn Fn() + Sync),
-) -> f64 {
-    let routes = PriorCourses::held_out(robot, seed).routes(recipe.calibration_maps, on_map);
-    let rows = drive_all((&routes, prior), (CALIBRATION_DRIVES, recipe.episodes), seed);
-    let (mut scratch, mut predicted, mut failures) = (Scratch::default(), 0.0, 0.0);
-    for row in &rows {
-        let log_risk = network.predict(&row.inputs, &mut scratch)[1];
-        let risk = libm::expf(log_risk);
-        if risk < CALIBRATED_RISK {
-            predicted += f64::from(row.passes * risk);
-            failures += f64::from(row.failures);
-        }
-    }
-    if predicted == 0.0 || failures == 0.0 {
-        return 1.0;
-    }
-    let factor: f64 = failures / predicted;
-    // The last bias is that of the logarithm of the risk.
-    if let Some(bias) = network.parameters_mut().last_mut() {
-        *bias += libm::log(factor) as f32;
-    }
-    factor
+    Ok(FittedCost { model: CostModel::new(network)?, rows: rows.len(), failures, losses })
 }
 
 /// Drives each of `routes` so many times under drawn noises, so many episodes each.

@@ -66,8 +66,6 @@ struct PriorCostReport {
     failures: f64,
     /// Mean loss of each epoch.
     losses: Vec<f64>,
-    /// What the risk was multiplied by, so that it is right for held-out kinds of map.
-    risk_factor: f64,
     time_s: f64,
 }
 
@@ -211,7 +209,7 @@ fn run_cost(args: &PriorCost, seed: u64, json: bool) -> Result<Exit, Failure> {
         Preset::Tiny => CostRecipe::tiny(),
         Preset::Default => CostRecipe::shipped(),
     };
-    let bar = progress::bar(u64::from(recipe.map_count + recipe.calibration_maps), "planning courses");
+    let bar = progress::bar(u64::from(recipe.map_count), "planning courses");
     let fitted = fit_cost((&robot, &prior, &recipe, Seed(seed)), &|| bar.inc(1));
     bar.finish_and_clear();
     let fitted = fitted.map_err(|error| Failure::new("TRAINING", error.to_string()))?;
@@ -225,7 +223,6 @@ fn run_cost(args: &PriorCost, seed: u64, json: bool) -> Result<Exit, Failure> {
         rows: fitted.rows,
         failures: fitted.failures,
         losses: fitted.losses,
-        risk_factor: fitted.risk_factor,
         time_s: begun.elapsed().as_secs_f64(),
     };
     if json {
