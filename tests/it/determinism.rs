@@ -46,6 +46,8 @@ fn quick_fast() -> Method {
     let mut method = Method::fast().with_episodes(200, 100, 100);
     method.learner = Arc::new(selection);
     (method.repair.rounds, method.repair.judge_episodes) = (1, 50);
+    // The direct way is no option, and cheaper here.
+    method.search.direct = false;
     method
 }
 

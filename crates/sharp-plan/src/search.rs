@@ -420,7 +420,8 @@ mod tests {
         let world = world(ALCOVE, OptionKind::Centroid);
         let query = Query { start: Pose::new(1.0, 1.4, 0.0), goal: Pose::new(9.8, 1.4, 0.0) };
         let names = |bypasses| {
-            let settings = SearchSettings { bypasses, ..SearchSettings::default() };
+            let price = PriceRule::Profile;
+            let settings = SearchSettings { bypasses, price, ..SearchSettings::default() };
             names(&plan(&world, query, settings, &unmeasured).expect("a way"))
         };
         assert_eq!(names(true), "first:0 c:0-1-2 last:2");

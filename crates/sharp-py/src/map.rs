@@ -61,13 +61,8 @@ impl PyMap {
         let grid = OccupancyGrid::new(frame, cells.iter().map(occupancy).collect())
             .map_err(|error| Raised::new("MAP_INVALID", error))?;
         let picture = *grid.frame();
-        let file = MapFile {
-            name: name.to_owned(),
-            grid,
-            problems: Vec::new(),
-            warnings: Vec::new(),
-            picture,
-        };
+        let file =
+            MapFile { name: name.to_owned(), grid, problems: Vec::new(), warnings: Vec::new(), picture };
         Ok(Self { file })
     }
 

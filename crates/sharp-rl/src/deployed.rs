@@ -31,12 +31,12 @@ pub struct DeployedActor {
 #[derive(Clone, Debug, PartialEq)]
 struct Columns {
     outputs: usize,
-    blocks: Vec<Block>,
+    blocks: Vec<OutputBlock>,
 }
 
 /// The biases of a block of outputs, and for each input its weights; padded with zeros.
 #[derive(Clone, Debug, PartialEq)]
-struct Block {
+struct OutputBlock {
     bias: [f32; BLOCK],
     columns: Vec<[f32; BLOCK]>,
 }
@@ -130,7 +130,7 @@ impl Columns {
             };
             let mut bias = [0.0; BLOCK];
             bias[..count].copy_from_slice(&layer.bias[first..first + count]);
-            Block { bias, columns: (0..inputs).map(column).collect() }
+            OutputBlock { bias, columns: (0..inputs).map(column).collect() }
         };
         Self { outputs, blocks: (0..outputs).step_by(BLOCK).map(block).collect() }
     }

@@ -93,19 +93,18 @@ impl Mlp {
         let mut sizes: Vec<usize> = self.sizes.iter().zip(&other.sizes).map(|(a, b)| a + b).collect();
         sizes[0] = self.sizes[0];
         let mut parameters = Vec::with_capacity(parameter_count(&sizes));
-        for index in 0..self.layer_count() {
-            let both = [(self, 0), (other, self.sizes[index])];
-            for (network, place) in both {
+        for (index, &width) in sizes[..self.layer_count()].iter().enumerate() {
+            // The first layer of both reads the same inputs.
+            let place = if index == 0 { 0 } else { self.sizes[index] };
+            for (network, before) in [(self, 0), (other, place)] {
                 let inputs = network.sizes[index];
-                // The first layer of both reads the same inputs.
-                let before = if index == 0 { 0 } else { place };
                 for row in network.layer(index).weights.chunks_exact(inputs) {
                     parameters.extend(std::iter::repeat_n(0.0, before));
                     parameters.extend_from_slice(row);
-                    parameters.extend(std::iter::repeat_n(0.0, sizes[index] - before - inputs));
+                    parameters.extend(std::iter::repeat_n(0.0, width - before - inputs));
                 }
             }
-            both.iter().for_each(|(network, _)| parameters.extend_from_slice(network.layer(index).bias));
+            [self, other].iter().for_each(|network| parameters.extend_from_slice(network.layer(index).bias));
         }
         Some(Self { sizes, parameters })
     }

@@ -4,7 +4,7 @@ use sharp_rl::Samples;
 use sharp_sim::{NoiseModel, Simulator};
 use sharp_space::Seed;
 
-use super::places::{PLACE_LEN, Place};
+use super::places::{GuidePlace, PLACE_LEN};
 use super::{BIN_M, CostModel, GuideEnds};
 use crate::automaton::{Automaton, Link};
 use crate::episode::{Controller, Decision, Episode, EpisodeRules, Motion, Supervisor};
@@ -101,9 +101,10 @@ pub fn drive_rows(
         episode.begin(start, seed, number);
         let observation = Observation::first(start, noise).without_slip_estimate();
         let automaton = Automaton::new(links.into(), observation);
-        let mut watch = Watch { world, policy: &mut policy, automaton, tallies: &mut tallies, failed: false };
-        episode.drive(&mut watch, &Supervisor::silent());
-        watch.finish();
+        let mut log =
+            DriveLog { world, policy: &mut policy, automaton, tallies: &mut tallies, failed: false };
+        episode.drive(&mut log, &Supervisor::silent());
+        log.finish();
     }
     // Where a robot was put somewhere at random, its first failures say nothing of the place.
     let begun = usize::from(!from_rest);
@@ -112,7 +113,7 @@ pub fn drive_rows(
         for (bin, tally) in tallies.into_iter().enumerate().filter(|(_, tally)| tally.passes > 0.0) {
             let mut inputs = [0.0; CostModel::INPUTS];
             let ends = GuideEnds { from_rest: from_rest && index == 0, to_goal: link.next.is_none() };
-            let place = Place { arc_m: bin as f64 * BIN_M, ends };
+            let place = GuidePlace { arc_m: bin as f64 * BIN_M, ends };
             place.write(world, &guide, &mut inputs[..PLACE_LEN]);
             inputs[PLACE_LEN..].copy_from_slice(&context.entries());
             let Tally { passes, time_s, failures } = tally;
@@ -129,7 +130,7 @@ struct Tally {
 }
 
 /// Drives a chain and notes in which bin of its guides time passes and episodes fail.
-struct Watch<'a> {
+struct DriveLog<'a> {
     world: &'a World,
     policy: &'a mut OptionPolicy,
     automaton: Automaton,
@@ -137,7 +138,7 @@ struct Watch<'a> {
     failed: bool,
 }
 
-impl Watch<'_> {
+impl DriveLog<'_> {
     /// The bin of the robot now.
     fn bin(&mut self) -> &mut Tally {
         let bins = &mut self.tallies[self.automaton.index()];
@@ -158,7 +159,7 @@ impl Watch<'_> {
     }
 }
 
-impl Controller for Watch<'_> {
+impl Controller for DriveLog<'_> {
     fn decide(&mut self) -> Decision {
         if !self.automaton.advance() {
             return Decision::Reached;
@@ -188,9 +189,10 @@ fn spread(bins: &mut [Tally], (from_m, to_m): (f64, f64), time_s: f64) {
         bins[bin(from_m)].time_s += time_s;
         return;
     }
-    for index in bin(from_m)..=bin(to_m) {
+    let (first, end) = (bin(from_m), bin(to_m));
+    for (index, bin) in bins.iter_mut().enumerate().take(end + 1).skip(first) {
         let begin_m = from_m.max(index as f64 * BIN_M);
         let end_m = if index == last { to_m } else { to_m.min((index + 1) as f64 * BIN_M) };
-        bins[index].time_s += time_s * ((end_m - begin_m) / way_m).max(0.0);
+        bin.time_s += time_s * ((end_m - begin_m) / way_m).max(0.0);
     }
 }

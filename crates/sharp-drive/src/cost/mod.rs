@@ -20,7 +20,7 @@ use crate::situation::GuideView;
 use crate::world::World;
 
 pub use drives::{DriveRow, RiskSamples, TimeSamples, drive_rows};
-use places::{PLACE_LEN, Place};
+use places::{GuidePlace, PLACE_LEN};
 
 /// Length of guide that a prediction speaks of, metres.
 pub(crate) const BIN_M: f64 = 0.25;
@@ -135,7 +135,7 @@ impl CostModel {
         for bin in 0..count {
             let arc_m = bin as f64 * BIN_M;
             let share = ((length_m - arc_m) / BIN_M).min(1.0);
-            Place { arc_m, ends }.write(world, guide, &mut input[..PLACE_LEN]);
+            GuidePlace { arc_m, ends }.write(world, guide, &mut input[..PLACE_LEN]);
             let said = self.deployed.predict(&input, &mut scratch);
             cost.time_s += share * exp(said[0]);
             cost.risk += share * exp(said[1]);

@@ -20,20 +20,20 @@ const NARROWEST_TO_M: [f64; 2] = [0.5, 2.0];
 /// Way driven, and way left, beyond which more makes no difference, metres.
 const WAY_MAX_M: f64 = 2.0;
 
-/// Length of what [`Place::write`] writes.
+/// Length of what [`GuidePlace::write`] writes.
 pub(super) const PLACE_LEN: usize =
     2 * (ROOM_AT_M.len() + 2 * FLANKS_AT_M.len() + NARROWEST_TO_M.len()) + TURN_TO_M.len() + 4;
 
 /// A place of a guide.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct GuidePlace {
     /// Metres from the guide's start.
     pub(super) arc_m: f64,
     /// What lies before and after the guide.
     pub(super) ends: GuideEnds,
 }
 
-impl Place {
+impl GuidePlace {
     /// Room along the guide, the least of it ahead, room at the flanks, turns, way since the robot stood, way left of the option, whether
     /// the option is the last, and how near its end then is. The side of the first bend is always the left one:
     /// robots are as wide to either side.
