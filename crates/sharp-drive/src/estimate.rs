@@ -26,7 +26,7 @@ const BLOCK: u32 = 128;
 /// What a failure costs by default, seconds: somebody has to walk there and free the robot.
 pub const FAILURE_COST_S: f64 = 1000.0;
 /// Success rate below which costs do not rise further: no division by zero.
-pub(crate) const RATE_MIN: f64 = 1e-3;
+const RATE_MIN: f64 = 1e-3;
 
 impl SuccessEstimate {
     /// The estimate of `ends`: for each episode whether it succeeded, and its time in seconds.
@@ -41,9 +41,16 @@ impl SuccessEstimate {
     /// The expected cost of a use, seconds: mean time per success, and `failure_cost_s` for each failure.
     #[must_use]
     pub fn cost_s(&self, failure_cost_s: f64) -> f64 {
-        let success = self.count.rate().max(RATE_MIN);
-        self.mean_time_s / success + failure_cost_s * (1.0 - success)
+        expected_cost_s(self.mean_time_s, self.count.rate(), failure_cost_s)
     }
+}
+
+/// The expected cost of a use, seconds, where a success takes `time_s` and has this chance: mean time per success, and
+/// `failure_cost_s` for each failure.
+#[must_use]
+pub fn expected_cost_s(time_s: f64, success: f64, failure_cost_s: f64) -> f64 {
+    let success = success.max(RATE_MIN);
+    time_s / success + failure_cost_s * (1.0 - success)
 }
 
 /// An experiment: which world, simulator and noise, how many episodes, on which random streams.

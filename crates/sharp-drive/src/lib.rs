@@ -64,7 +64,7 @@ pub use episode::{
     Controller, Decision, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Motion, Readiness, Supervisor,
     TIME_LIMIT_MIN_S,
 };
-pub use estimate::{FAILURE_COST_S, MonteCarlo, SuccessEstimate};
+pub use estimate::{FAILURE_COST_S, MonteCarlo, SuccessEstimate, expected_cost_s};
 pub use follower::{Follower, SteeringRule};
 pub use initial_states::{InitialStates, StateSpread};
 pub use mppi::{Mppi, MppiSettings};

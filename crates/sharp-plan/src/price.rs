@@ -2,6 +2,7 @@
 
 use sharp_drive::{
     CostModel, GuideEnds, GuideView, Prior, ProfiledFollower, SpeedProfile, SuccessEstimate, World,
+    expected_cost_s,
 };
 use sharp_guide::{GuidePath, LegId, Role};
 use sharp_sim::NoiseModel;
@@ -11,8 +12,6 @@ use crate::method::{PriceRule, SearchSettings};
 /// Time of a learnt policy as a share of the tuned speed profile's: 0.69 for 115 options of the Husky and 0.74 for 79
 /// of the Limo, in the plans of `a` to `d`.
 const PACE: f64 = 0.72;
-/// Success below which costs do not rise further, as in [`SuccessEstimate::cost_s`].
-const SUCCESS_MIN: f64 = 1e-3;
 
 /// Prices options in a world under a noise.
 #[derive(Clone, Debug)]
@@ -71,7 +70,7 @@ impl<'a> Pricer<'a> {
     pub(crate) fn cost_s(&self, price: &Price, measured: Option<&SuccessEstimate>) -> f64 {
         let Price { time_s, success } = *price;
         let Some(SuccessEstimate { count, mean_time_s }) = measured else {
-            return self.cost_of(time_s, success);
+            return expected_cost_s(time_s, success, self.failure_cost_s);
         };
         let weight = match self.settings.price {
             PriceRule::Model => self.settings.price_episodes,
@@ -80,12 +79,8 @@ impl<'a> Pricer<'a> {
         let episodes = weight + f64::from(count.episodes);
         let successes = weight * success + f64::from(count.successes);
         let time_s = if mean_time_s.is_finite() || weight == 0.0 { *mean_time_s } else { time_s };
-        self.cost_of(time_s, if episodes > 0.0 { successes / episodes } else { 0.0 })
-    }
-
-    fn cost_of(&self, time_s: f64, success: f64) -> f64 {
-        let success = success.max(SUCCESS_MIN);
-        time_s / success + self.failure_cost_s * (1.0 - success)
+        let success = if episodes > 0.0 { successes / episodes } else { 0.0 };
+        expected_cost_s(time_s, success, self.failure_cost_s)
     }
 }
 

@@ -52,7 +52,7 @@ pub(super) fn robot(name: &str, files: &[PathBuf], mut facts: Facts) -> Result<I
     parts.fields.push(drive.field);
     parts.found("max_speed_mps", number_text(speed.value), &speed.source);
     let mut numbers = numbers(&facts, &mut parts, &mut Vec::new());
-    // An inertia that no body of that mass and those wheels has is a placeholder of the description's author.
+    // An inertia that no body of that mass and those wheels has was a guess of the description's author.
     let complete = |parts: &RobotLines| RobotModel::from_ron(&parts.bare(name));
     let robot = complete(&parts).or_else(|error| {
         if facts.numbers.remove(&Quantity::YawInertia).is_none() {

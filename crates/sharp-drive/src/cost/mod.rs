@@ -14,7 +14,7 @@ use std::sync::{Arc, LazyLock};
 use sharp_rl::{DeployedMlp, DeployedScratch, Mlp, StoreError};
 use sharp_sim::{NoiseModel, RobotModel};
 
-use crate::estimate::RATE_MIN;
+use crate::estimate::expected_cost_s;
 use crate::network::PolicyContext;
 use crate::situation::GuideView;
 use crate::world::World;
@@ -57,14 +57,14 @@ impl PredictedCost {
     /// The chance to arrive.
     #[must_use]
     pub fn success(&self) -> f64 {
-        (-self.risk).exp()
+        // Not the system's: prices decide plans, and must not differ from machine to machine.
+        libm::exp(-self.risk)
     }
 
     /// The expected cost of a use, seconds: mean time per success, and `failure_cost_s` for each failure.
     #[must_use]
     pub fn cost_s(&self, failure_cost_s: f64) -> f64 {
-        let success = self.success().max(RATE_MIN);
-        self.time_s / success + failure_cost_s * (1.0 - success)
+        expected_cost_s(self.time_s, self.success(), failure_cost_s)
     }
 }
 

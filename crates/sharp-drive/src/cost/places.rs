@@ -34,9 +34,9 @@ pub(super) struct GuidePlace {
 }
 
 impl GuidePlace {
-    /// Room along the guide, the least of it ahead, room at the flanks, turns, way since the robot stood, way left of the option, whether
-    /// the option is the last, and how near its end then is. The side of the first bend is always the left one:
-    /// robots are as wide to either side.
+    /// Room along the guide, the least of it ahead, room at the flanks, turns, way since the robot stood, way left of
+    /// the option, whether the option is the last, and how near its end then is. The side of the first bend is always
+    /// the left one: robots are as wide to either side.
     pub(super) fn write(&self, world: &World, guide: &GuideView<'_>, inputs: &mut [f32]) {
         let (field, footprint) = (world.geometry.clearance(), &world.robot.footprint);
         let length_m = guide.current.length_m();

@@ -18,8 +18,8 @@ const PRIOR_HIDDEN: [usize; 2] = [128, 128];
 /// Reward of a contact while a prior is trained on: what it was trained with at full caution.
 const FINE_CONTACT: f64 = -20.0;
 
-/// Takes the prior, and a follower where that falls short; trains the prior
-/// on where a plan falls short and nothing at hand succeeds often enough.
+/// Takes the prior, and a follower where that falls short; trains the prior on where a plan falls short and nothing
+/// at hand succeeds often enough.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Selection {
