@@ -39,10 +39,11 @@ fn here() -> PathBuf {
 }
 
 /// The library that cargo built for this test.
+///
+/// It lies beside the program in `deps`: only `cargo build` puts a copy one folder up.
 fn library() -> PathBuf {
     let program = std::env::current_exe().expect("this program has a path");
-    let folder = program.parent().and_then(Path::parent).expect("target/PROFILE/deps/PROGRAM");
-    folder.join("libsharp_core.so")
+    program.with_file_name("libsharp_core.so")
 }
 
 /// What the script called `name` prints; `None` where there is no Python.
