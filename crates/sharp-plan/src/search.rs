@@ -6,13 +6,13 @@
 //! option that cannot be guided has lost its edge: the repair that downward refinability needs.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 use sharp_drive::{SuccessEstimate, World};
 use sharp_guide::{
-    Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption, ridge_routes,
-    routes,
+    Departure, Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption,
+    departures, ridge_routes, routes,
 };
 use sharp_options::OptionId;
 use sharp_rbvd::{StateAbstraction, StateId};
@@ -33,6 +33,9 @@ const CAR_TURN_MAX_RAD: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
 /// stand where the diagram's margin has no state.
 const STATE_NEAR_M: f64 = 0.5;
 
+/// A leg from the start whose guide succeeds less often than this, by its price, looks for a better way to begin.
+const LEAVES_WELL: f64 = 0.98;
+
 /// The guided options of one problem and the searches among them.
 #[derive(Debug)]
 pub struct Search<'a> {
@@ -47,6 +50,8 @@ pub struct Search<'a> {
     pricer: Pricer<'a>,
     /// What guided options cost before they are measured.
     prices: BTreeMap<LegId, Price>,
+    /// How the robot can leave its start, where that is a tight place; found when it is first asked for.
+    departures: OnceLock<Vec<(Departure, Vec<Pose>)>>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
@@ -99,6 +104,7 @@ impl<'a> Search<'a> {
             guided: BTreeMap::new(),
             pricer: Pricer::new(world, noise, method.search, method.failure_cost_s),
             prices: BTreeMap::new(),
+            departures: OnceLock::new(),
             offers_direct: false,
             charges: BTreeMap::new(),
             seed,
@@ -149,7 +155,8 @@ impl<'a> Search<'a> {
     /// Notes the guide of the option called `id`, or that it has none.
     fn keep(&mut self, id: LegId, option: Result<Arc<GuidedOption>, NoGuide>) {
         if let Ok(option) = &option {
-            self.prices.insert(id, self.pricer.price(id, &option.guide, None));
+            let price = self.pricer.price(option, None);
+            self.prices.insert(id, price);
         }
         self.guided.insert(id, option);
     }
@@ -253,21 +260,66 @@ impl<'a> Search<'a> {
             let guide = guide_of_nothing(self.query.start, self.settings.guide.spacing_m);
             return guide.map(|guide| Arc::new(self.guided(candidate, guide)));
         }
-        if id == LegId::Direct && self.settings.direct {
-            let guide = self.direct_route(candidate.option.end).ok_or(NoGuide::Unreachable)?;
-            return Ok(Arc::new(self.guided(candidate, guide)));
+        if !matches!(id, LegId::First(_) | LegId::Direct) {
+            return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
         }
-        let mut rng = self.seed.stream(&format!("guide {id}"), 0);
-        let robot = self.world.guide_robot();
-        let guide = candidate.option.plan_guide(&self.space, &robot, self.guides, &mut rng)?;
-        Ok(Arc::new(self.guided(candidate, guide)))
+        let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
+        if !self.settings.departures
+            || at_once.as_ref().is_ok_and(|option| self.success(option) >= LEAVES_WELL)
+        {
+            return at_once.map(Arc::new);
+        }
+        let others = self.departures().iter().filter_map(|way| self.departing(candidate, way));
+        let cost_s = |option: &GuidedOption| self.pricer.cost_s(&self.price(option), None);
+        let best = at_once.iter().cloned().chain(others).min_by(|a, b| cost_s(a).total_cmp(&cost_s(b)));
+        best.map_or(at_once, Ok).map(Arc::new)
+    }
+
+    fn price(&self, option: &GuidedOption) -> Price {
+        self.pricer.price(option, None)
+    }
+
+    fn success(&self, option: &GuidedOption) -> f64 {
+        self.price(option).success()
+    }
+
+    /// The ways out of the start, where it is a tight place.
+    fn departures(&self) -> &[(Departure, Vec<Pose>)] {
+        self.departures.get_or_init(|| {
+            let robot = &self.world.robot;
+            departures(&self.world.guide_robot(), self.query.start, robot.recovery_reverse_m)
+        })
+    }
+
+    /// The leg `candidate` with a guide that begins with `way`.
+    fn departing(&self, candidate: &Candidate, way: &(Departure, Vec<Pose>)) -> Option<GuidedOption> {
+        let (departure, lead) = way;
+        let rest = self.plan_from(candidate, *lead.last()?).ok()?;
+        let mut poses = lead.clone();
+        poses.extend(&rest.poses()[1..]);
+        let guide = GuidePath::new(poses, rest.spacing_m()).ok()?;
+        Some(self.guided(candidate, guide).with_departure(*departure))
+    }
+
+    /// A guide for the leg `candidate` for a robot at `start`.
+    fn plan_from(&self, candidate: &Candidate, start: Pose) -> Result<GuidePath, NoGuide> {
+        if candidate.id() == LegId::Direct && self.settings.direct {
+            return self.direct_route(start, candidate.option.end).ok_or(NoGuide::Unreachable);
+        }
+        let (start, heading) = (start.position, Some(start.heading));
+        self.plan_guide(&UnguidedOption { start, heading, ..candidate.option })
+    }
+
+    fn plan_guide(&self, option: &UnguidedOption) -> Result<GuidePath, NoGuide> {
+        let mut rng = self.seed.stream(&format!("guide {}", option.id), 0);
+        option.plan_guide(&self.space, &self.world.guide_robot(), self.guides, &mut rng)
     }
 
     /// The cheapest of the routes to `end` with different safety margins, by their prices.
-    fn direct_route(&self, end: Point) -> Option<GuidePath> {
-        let (robot, start) = (self.world.guide_robot(), self.query.start);
+    fn direct_route(&self, start: Pose, end: Point) -> Option<GuidePath> {
+        let robot = self.world.guide_robot();
         let price_s =
-            |guide: &GuidePath| self.pricer.cost_s(&self.pricer.price(LegId::Direct, guide, None), None);
+            |guide: &GuidePath| self.pricer.cost_s(&self.pricer.of_guide(LegId::Direct, guide, None), None);
         let cheapest = ridge_routes(&robot, start, end).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
         cheapest.or_else(|| routes(&robot, start, end, 0.5 * self.goal.radius_m).next())
     }
