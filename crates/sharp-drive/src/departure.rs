@@ -5,13 +5,13 @@ use crate::follower::{SteeringRule, compensated};
 use crate::situation::Situation;
 
 /// Speed of leaving a tight place, metres per second: drift turns a slow robot less before it is corrected.
-pub const CAREFUL_MPS: f64 = 0.15;
+pub const CAREFUL_MPS: f64 = 0.1;
 /// Waypoints of a robot that turns in place: 5 cm of noise turn it by 5 mrad.
 const FAR_M: f64 = 10.0;
 /// Waypoints of a car, which steers by their curvature: further away it would hardly steer.
 const FAR_CAR_M: f64 = 1.5;
 /// Along the guide's direction, and gently back to it.
-const RULE: SteeringRule = SteeringRule::Field { look_ahead_m: 0.1, softness_m: 1.0 };
+const RULE: SteeringRule = SteeringRule::Field { look_ahead_m: 0.05, softness_m: 1.0 };
 /// Share of the estimated drift that is compensated.
 const DRIFT_COMPENSATION: f64 = 0.5;
 

@@ -1,4 +1,4 @@
-//! How a robot leaves a tight place: nose at a wall it backs off first, close beside a wall it drives a gentle arc.
+//! How a robot leaves a tight place: nose at a wall it backs off first, close beside a wall it drives a gentle curve.
 //!
 //! A guide begins where the robot can turn and steer. Where it stands closer to an obstacle than that, something has to
 //! come before. The paper has nothing of the kind: its robots start in the open.
@@ -12,14 +12,15 @@ use crate::inflate::GuideRobot;
 
 /// Distance between two ways of backing off, metres.
 const BACK_OFF_STEP_M: f64 = 0.1;
-/// Radii of the arcs that are tried, metres, the tightest first.
-const RADII_M: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 12.0, 20.0];
-/// The longest arc, metres.
-const ARC_MAX_M: f64 = 3.0;
-/// Share of the room beside the robot at the start that an arc leaves for noise.
-const ROOM_LEFT: f64 = 0.5;
+/// Radii that are tried for each piece of a curve, metres, the tightest first.
+const RADII_M: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, f64::INFINITY];
+/// The longest curve, metres.
+const CURVE_MAX_M: f64 = 3.0;
+/// Share of the room beside the robot at the start that a curve leaves for noise; the second where the first does not
+/// lead into the open. A Husky 2 cm beside a wall touches it in 3 of 1,000 runs with the first, in 90 with the second.
+const ROOM_LEFT: [f64; 2] = [0.8, 0.5];
 /// Room beside the robot at which a place is no longer tight, metres.
-pub const TIGHT_M: f64 = 0.1;
+const TIGHT_M: f64 = 0.2;
 /// Room below which it is not told apart from none, metres.
 const ROOM_STEP_M: f64 = 0.005;
 
@@ -47,12 +48,20 @@ impl Departure {
     }
 }
 
+/// Returns true if an obstacle is so near to `robot` at `start` that no guide begins there without care.
+#[must_use]
+pub fn is_tight(robot: &GuideRobot<'_>, start: Pose) -> bool {
+    !robot.geometry.inflated(TIGHT_M).is_free(start)
+}
+
 /// The ways in which `robot` can leave `start`, each with the poses that come before the guide, the last of which is
 /// where the guide begins. It backs off by `back_off_max_m` at most.
 #[must_use]
 pub fn departures(robot: &GuideRobot<'_>, start: Pose, back_off_max_m: f64) -> Vec<(Departure, Vec<Pose>)> {
     let mut ways = back_offs(robot, start, back_off_max_m);
-    ways.extend(arcs(robot, start));
+    let furthest = ways.last().map(|(departure, _)| *departure);
+    ways.extend(curves(robot, start, Departure::default()));
+    ways.extend(furthest.into_iter().flat_map(|departure| curves(robot, start, departure)));
     ways
 }
 
@@ -65,32 +74,44 @@ fn back_offs(robot: &GuideRobot<'_>, start: Pose, most_m: f64) -> Vec<(Departure
     ways.take_while(|(_, lead)| robot.geometry.is_segment_free(start, lead[0], CHECK_STEP_M)).collect()
 }
 
-/// On each side the tightest arc that leaves half of the room, up to where it is no longer tight.
-fn arcs(robot: &GuideRobot<'_>, start: Pose) -> Vec<(Departure, Vec<Pose>)> {
+/// On each side the curve that turns away as fast as the room beside the robot allows, up to where it is no longer
+/// tight.
+fn curves(robot: &GuideRobot<'_>, start: Pose, after: Departure) -> Vec<(Departure, Vec<Pose>)> {
+    let start = after.after_back_off(start);
     let room_m = room_m(robot, start);
     if room_m >= TIGHT_M {
         return vec![];
     }
-    let noisy = robot.geometry.inflated(ROOM_LEFT * room_m);
+    let sides = [1.0, -1.0].into_iter();
+    let curve =
+        |side| ROOM_LEFT.into_iter().find_map(|share| curve(robot, (start, after), share * room_m, side));
+    sides.filter_map(curve).collect()
+}
+
+/// The curve to one `side` that leaves `left_m` of room beside the robot.
+fn curve(
+    robot: &GuideRobot<'_>,
+    (start, after): (Pose, Departure),
+    left_m: f64,
+    side: f64,
+) -> Option<(Departure, Vec<Pose>)> {
+    let noisy = robot.geometry.inflated(left_m);
     let wide = robot.geometry.inflated(TIGHT_M);
-    let arc = |radius_m: f64| {
-        let mut lead = vec![start];
-        for i in 1..=(ARC_MAX_M / CHECK_STEP_M) as usize {
-            let travel_m = i as f64 * CHECK_STEP_M;
-            let pose = Primitive { travel_m, turn_rad: travel_m / radius_m }.advance(start, 1.0);
-            if !noisy.is_free(pose) {
-                return None;
-            }
-            lead.push(pose);
-            if wide.is_free(pose) {
-                return Some((Departure { back_off_m: 0.0, careful_m: travel_m }, lead));
-            }
-        }
-        None
-    };
     let least_m = 1.1 * robot.steering.radius_m();
-    let radii = || RADII_M.into_iter().filter(|&radius_m| radius_m >= least_m);
-    [1.0, -1.0].into_iter().filter_map(|side| radii().find_map(|radius_m| arc(side * radius_m))).collect()
+    let mut lead = vec![start];
+    for i in 1..=(CURVE_MAX_M / CHECK_STEP_M) as usize {
+        let here = lead[lead.len() - 1];
+        let bend = |radius_m: f64| {
+            Primitive { travel_m: CHECK_STEP_M, turn_rad: side * CHECK_STEP_M / radius_m }.advance(here, 1.0)
+        };
+        let mut bends = RADII_M.into_iter().filter(|&radius_m| radius_m >= least_m).map(bend);
+        let pose = bends.find(|&pose| noisy.is_free(pose))?;
+        lead.push(pose);
+        if wide.is_free(pose) {
+            return Some((Departure { careful_m: i as f64 * CHECK_STEP_M, ..after }, lead));
+        }
+    }
+    None
 }
 
 /// How much larger the outline could be on all sides at `pose`, metres, [`TIGHT_M`] at most.
@@ -148,5 +169,6 @@ mod tests {
         assert!(checker.inflated(TIGHT_M).is_free(end), "it ends in the open");
         let open = Pose::new(3.0, 2.0, 0.0);
         assert_eq!(departures(&robot, open, 0.0), vec![], "nothing to leave");
+        assert_eq!([start, open].map(|pose| is_tight(&robot, pose)), [true, false]);
     }
 }

@@ -44,7 +44,7 @@ mod settings;
 mod traversable;
 
 pub use crossing::crossing_heading;
-pub use departure::{Departure, TIGHT_M, departures};
+pub use departure::{Departure, departures, is_tight};
 pub use goal::Goal;
 pub use guided_option::{GuidedOption, LegId, OptionSpace, Role, Target};
 pub use inflate::{GuideRobot, InflatedRobot, inflated_robots};

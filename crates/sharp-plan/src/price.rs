@@ -1,8 +1,8 @@
 //! What an option costs: before it was driven, and with what was measured since.
 
 use sharp_drive::{
-    CAREFUL_MPS, CostModel, GuideEnds, GuideView, Prior, ProfiledFollower, SpeedProfile, SuccessEstimate,
-    World, expected_cost_s,
+    CAREFUL_MPS, CostModel, GuideEnds, GuideView, OptionPolicy, Prior, ProfiledFollower, SpeedProfile,
+    SuccessEstimate, World, expected_cost_s,
 };
 use sharp_guide::{Departure, GuidePath, GuidedOption, LegId, Role};
 use sharp_sim::{BACK_OFF_MPS, NoiseModel};
@@ -54,6 +54,12 @@ impl<'a> Pricer<'a> {
     ) -> Self {
         let profile = ProfiledFollower::tuned(&world.robot, noise).speed;
         Self { world, noise: noise.clone(), settings, failure_cost_s, profile }
+    }
+
+    /// The policy whose drives the model prices: the prior.
+    pub(crate) fn policy(&self) -> OptionPolicy {
+        let caution = Prior::caution(self.failure_cost_s);
+        Prior::shipped(&self.world.robot).at(caution, &self.world.robot, &self.noise)
     }
 
     /// The price of `option`, and the `next` guide after it where that is known.

@@ -9,17 +9,18 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
-use sharp_drive::{SuccessEstimate, World};
+use sharp_drive::{Driver, InitialStates, SuccessEstimate, World};
 use sharp_guide::{
     Departure, Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption,
-    departures, ridge_routes, routes,
+    departures, is_tight, ridge_routes, routes,
 };
 use sharp_options::OptionId;
 use sharp_rbvd::{StateAbstraction, StateId};
-use sharp_sim::NoiseModel;
+use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::{Cell, Point, Pose, Seed, trig};
 
 use crate::abstraction::Abstraction;
+use crate::conditions::Conditions;
 use crate::method::{Method, PriceRule, SearchSettings};
 use crate::option_graph::{Candidate, OptionGraph};
 use crate::price::{Price, Pricer};
@@ -33,6 +34,8 @@ const CAR_TURN_MAX_RAD: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
 /// stand where the diagram's margin has no state.
 const STATE_NEAR_M: f64 = 0.5;
 
+/// Episodes in which each way out of a tight start is tried.
+const TRIAL_EPISODES: u32 = 200;
 /// A leg from the start whose guide succeeds less often than this, by its price, looks for a better way to begin.
 const LEAVES_WELL: f64 = 0.98;
 
@@ -52,6 +55,8 @@ pub struct Search<'a> {
     prices: BTreeMap<LegId, Price>,
     /// How the robot can leave its start, where that is a tight place; found when it is first asked for.
     departures: OnceLock<Vec<(Departure, Vec<Pose>)>>,
+    /// Under what they are tried; by their prices alone without.
+    trials: Option<&'a Conditions>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
@@ -105,6 +110,7 @@ impl<'a> Search<'a> {
             pricer: Pricer::new(world, noise, method.search, method.failure_cost_s),
             prices: BTreeMap::new(),
             departures: OnceLock::new(),
+            trials: None,
             offers_direct: false,
             charges: BTreeMap::new(),
             seed,
@@ -264,23 +270,45 @@ impl<'a> Search<'a> {
             return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
         }
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
-        if !self.settings.departures
-            || at_once.as_ref().is_ok_and(|option| self.success(option) >= LEAVES_WELL)
-        {
+        let is_tight = is_tight(&self.world.guide_robot(), self.query.start);
+        let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).success() >= LEAVES_WELL;
+        if !self.settings.departures || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
         }
+        // A price knows little of tight places; elsewhere only what seems better than to drive at once is tried.
+        let priced_s = |option: &GuidedOption| self.pricer.cost_s(&self.pricer.price(option, None), None);
+        let at_once_s = at_once.as_ref().map_or(f64::INFINITY, priced_s);
         let others = self.departures().iter().filter_map(|way| self.departing(candidate, way));
-        let cost_s = |option: &GuidedOption| self.pricer.cost_s(&self.price(option), None);
-        let best = at_once.iter().cloned().chain(others).min_by(|a, b| cost_s(a).total_cmp(&cost_s(b)));
-        best.map_or(at_once, Ok).map(Arc::new)
+        let mut ways: Vec<GuidedOption> =
+            others.filter(|option| is_tight || priced_s(option) < at_once_s).collect();
+        if ways.is_empty() {
+            return at_once.map(Arc::new);
+        }
+        ways.extend(at_once);
+        let options = ways.into_iter().map(Arc::new);
+        let tried = options.map(|option| (self.trial_cost_s(&option), option));
+        let (_, option) = tried.min_by(|a, b| a.0.total_cmp(&b.0)).expect("there is a way");
+        Ok(option)
     }
 
-    fn price(&self, option: &GuidedOption) -> Price {
-        self.pricer.price(option, None)
+    /// What the leg `option` costs from the start, seconds: by a few episodes of the prior where there is a simulator, for
+    /// a price knows little of tight places.
+    fn trial_cost_s(&self, option: &Arc<GuidedOption>) -> f64 {
+        let price = self.pricer.price(option, None);
+        let measured = self.trials.map(|conditions| {
+            let policy = self.pricer.policy();
+            let states = InitialStates::exactly(RobotState::at_rest(self.query.start));
+            let seed = self.seed.child(&format!("leave {}", option.id), 0);
+            let trial = conditions.monte_carlo(self.world).with_episodes(TRIAL_EPISODES).with_seed(seed);
+            trial.estimate(&[Driver::new(option, &policy, None)], &states)
+        });
+        self.pricer.cost_s(&price, measured.as_ref())
     }
 
-    fn success(&self, option: &GuidedOption) -> f64 {
-        self.price(option).success()
+    /// From now on ways out of a tight start are tried under `conditions` before one is taken.
+    #[must_use]
+    pub(crate) fn with_trials(self, conditions: &'a Conditions) -> Self {
+        Self { trials: Some(conditions), ..self }
     }
 
     /// The ways out of the start, where it is a tight place.
