@@ -124,7 +124,7 @@ fn room_m(robot: &GuideRobot<'_>, pose: Pose) -> f64 {
 #[cfg(test)]
 mod tests {
     use sharp_motion::Steering;
-    use sharp_space::{Footprint, FootprintChecker, OccupancyGrid};
+    use sharp_space::{Footprint, FootprintChecker, OccupancyGrid, RobotGeometry};
 
     use super::*;
 
