@@ -11,6 +11,7 @@ mod checker;
 
 mod bounds;
 mod endurance;
+mod mutations;
 mod plans;
 mod unsolvable;
 mod worlds;
