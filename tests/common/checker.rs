@@ -46,6 +46,14 @@ fn overlap_m(outline: &Outline, pose: Pose, (x, y): (f64, f64), side_m: f64) -> 
     }
 }
 
+/// The distance of the outline's furthest point from its reference point, metres.
+fn radius_m(outline: &Outline) -> f64 {
+    match outline {
+        Outline::Disc(radius_m) => *radius_m,
+        Outline::Corners(corners) => corners.iter().map(|&(x, y)| trig::hypot(x, y)).fold(0.0, f64::max),
+    }
+}
+
 /// The deepest overlap of `outline` at `pose` with any cell near it that is not free; maps here are not turned.
 pub(crate) fn deepest_m(grid: &OccupancyGrid, outline: &Outline, pose: Pose) -> f64 {
     let frame = grid.frame();
@@ -54,13 +62,18 @@ pub(crate) fn deepest_m(grid: &OccupancyGrid, outline: &Outline, pose: Pose) -> 
         let at = (at_m - from_m) / side_m;
         (at - 1.0 / side_m).max(0.0) as usize..((at + 1.0 / side_m).max(0.0) as usize).min(count)
     };
+    // No corner of outline and cell is further away together.
+    let reach_m = side_m + radius_m(outline);
     let origin = frame.origin.position;
     let mut deepest_m = f64::NEG_INFINITY;
     for row in near(pose.position.y, origin.y, frame.height) {
         for col in near(pose.position.x, origin.x, frame.width) {
             if grid.get(sharp_space::Cell::new(col, row)) != Occupancy::Free {
                 let (x, y) = (origin.x + (col as f64 + 0.5) * side_m, origin.y + (row as f64 + 0.5) * side_m);
-                deepest_m = deepest_m.max(overlap_m(outline, pose, (x, y), side_m));
+                let (dx, dy) = (x - pose.position.x, y - pose.position.y);
+                if dx * dx + dy * dy < reach_m * reach_m {
+                    deepest_m = deepest_m.max(overlap_m(outline, pose, (x, y), side_m));
+                }
             }
         }
     }

@@ -19,7 +19,7 @@ const LOOK_M: f64 = 0.0125;
 /// Between two looks of the planner a corner may cut a corner by this much, metres.
 const ALLOWED_M: f64 = 0.002;
 /// Plans that are tried in each building.
-const QUERIES: u64 = 10;
+const QUERIES: u64 = 25;
 
 /// What is wrong with the guides of a plan.
 fn fault(

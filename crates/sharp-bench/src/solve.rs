@@ -179,16 +179,12 @@ impl Solved {
     /// # Errors
     /// If a picture cannot be drawn or a file cannot be written.
     pub fn write(&mut self, folder: &Path, name: &Path) -> Result<(), BenchError> {
-        let Self { report, plan, sharp, file } = self;
+        let Self { report, plan, file, .. } = self;
         let Some(plan) = plan else { return Ok(()) };
         report.plan_dir = Some(name.display().to_string());
         plan.save(folder, file)?;
         let grid = &plan.world.grid;
         sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
-        if let Some(criticality) = sharp.detection().and_then(|found| found.criticality.as_deref()) {
-            let regions = pictures::regions_of(&file.rbvd);
-            pictures::write(folder, "regions", &pictures::regions(grid, criticality, &regions))?;
-        }
         pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction))?;
         pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[]))?;
         write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;

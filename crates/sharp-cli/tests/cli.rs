@@ -199,15 +199,14 @@ fn a_library_is_reused_and_a_damaged_one_is_named() {
     assert!(message.contains(option.file_name().unwrap().to_str().unwrap()), "{message}");
 }
 
-/// What lies in `folder` and below, by path, but for wall times and for the pictures that only who predicts
-/// the regions draws.
+/// What lies in `folder` and below, by path, but for wall times.
 fn files_in(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(next) = folders.pop() {
         for path in fs::read_dir(next).unwrap().map(|entry| entry.unwrap().path()) {
             match path.file_name().unwrap().to_str().unwrap() {
-                "solve.json" | "regions.png" | "regions.svg" => {}
+                "solve.json" => {}
                 _ if path.is_dir() => folders.push(path),
                 _ => {
                     let name = path.strip_prefix(folder).unwrap().to_owned();
