@@ -216,6 +216,10 @@ pub(crate) struct Solve {
     /// Stop after so many seconds of wall time, with the best plan so far; what was learnt is kept.
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
+    /// Drive the plan and write a page to look at: map, options, drives that move, weak places [default file: show.html
+    /// in the plan's folder].
+    #[arg(long, value_name = "FILE.html", num_args = 0..=1, value_parser = page_file)]
+    pub(crate) show: Option<Option<PathBuf>>,
     /// Write learning curves for TensorBoard there, one run a leg that is trained [default: none].
     #[arg(long, value_name = "DIR")]
     pub(crate) tensorboard: Option<PathBuf>,
@@ -250,6 +254,18 @@ pub(crate) struct Run {
     /// Write all episodes there, one after the other, as ROS 2 messages in an MCAP file, for Foxglove and others.
     #[arg(long, value_name = "FILE.mcap")]
     pub(crate) record: Option<PathBuf>,
+    /// Write a page of the executions to look at, as `sharp solve --show` does [default file: show.html in the plan's
+    /// folder].
+    #[arg(long, value_name = "FILE.html", num_args = 0..=1, value_parser = page_file)]
+    pub(crate) show: Option<Option<PathBuf>>,
+}
+
+/// The name of a page. What follows `--show` may be the next argument of the command instead, which this tells apart.
+fn page_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+    let expected = "expected a file that ends in .html; without a file, put --show last";
+    is_page.then_some(path).ok_or_else(|| expected.to_owned())
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

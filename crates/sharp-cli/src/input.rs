@@ -107,8 +107,8 @@ fn cache_folder() -> PathBuf {
         .join("sharp")
 }
 
-/// Refuses a `folder` that could not be made or written, before the work for it is done; leaves nothing behind.
-pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
+/// Refuses a `folder` of `flag` that could not be made or written, before the work for it is done; leaves nothing behind.
+pub(crate) fn check_out(flag: &str, folder: &Path) -> Result<(), Failure> {
     let mut there = folder;
     while !there.exists() {
         match there.parent().filter(|parent| !parent.as_os_str().is_empty()) {
@@ -117,8 +117,11 @@ pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
         }
     }
     tempfile::tempfile_in(there).map(drop).map_err(|error| {
-        let message =
-            format!("--out is {}, but in {} no file can be made: {error}", folder.display(), there.display());
+        let message = format!(
+            "{flag} is {}, but in {} no file can be made: {error}",
+            folder.display(),
+            there.display()
+        );
         Failure::new("FILE_INVALID", message)
     })
 }
@@ -232,10 +235,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("file");
         fs::write(&file, "").expect("a file");
-        let message = check_out(&file.join("plan")).unwrap_err().to_string();
+        let message = check_out("--out", &file.join("plan")).unwrap_err().to_string();
         assert!(message.contains("--out") && message.contains("file/plan"), "{message}");
         let new = folder.path().join("some/where");
-        check_out(&new).expect("can be made");
+        check_out("--out", &new).expect("can be made");
         assert!(!folder.path().join("some").exists(), "asking makes nothing");
     }
 }

@@ -14,4 +14,5 @@ mod regions_train;
 pub(crate) mod robot;
 pub(crate) mod run;
 pub(crate) mod serve;
+mod show;
 pub(crate) mod solve;
