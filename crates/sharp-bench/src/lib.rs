@@ -45,6 +45,7 @@ mod result;
 mod robot_import;
 mod show;
 mod solve;
+mod speed_mask;
 mod stopwatch;
 mod tensorboard;
 mod times;
@@ -81,6 +82,7 @@ pub use result::{
 pub use robot_import::{ImportError, ImportWishes, ImportedField, ImportedRobot, import_robot};
 pub use show::Shown;
 pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
+pub use speed_mask::{SpeedMaskError, SpeedRule, speed_limits};
 pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
 pub use tensorboard::EventFile;
 pub use times::{DecisionTimes, Reuse, SolveTimes};

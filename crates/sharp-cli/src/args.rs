@@ -11,7 +11,7 @@ use sharp_bench::{AbstractionRequest, BaselineKind, BaselineSettings};
 use sharp_options::OptionKind;
 use sharp_rbvd::CellMetric;
 
-pub(crate) use problem::ProblemArgs;
+pub(crate) use problem::{ProblemArgs, SpeedArgs};
 pub(crate) use robots::{DriveName, Robots};
 pub(crate) use suites::{EngineName, Eval, Jobs, Submit, SuiteArgs};
 
@@ -179,6 +179,8 @@ pub(crate) struct Solve {
     pub(crate) abstraction: AbstractionArgs,
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
+    #[command(flatten)]
+    pub(crate) speed: SpeedArgs,
     /// Drive there first, before the goal; may be repeated, in this order.
     #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true)]
     pub(crate) via: Vec<String>,

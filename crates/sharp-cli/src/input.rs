@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use sharp_maps::{LoadOptions, MapFile, load, load_scenario};
+use sharp_bench::SpeedRule;
+use sharp_drive::SpeedLimits;
+use sharp_maps::{LoadOptions, MapFile, load, load_scenario, load_values};
 use sharp_plan::Query;
 use sharp_sim::{SimulatorKind, UnknownSimulator};
 use sharp_space::{Point, Pose, trig};
 
-use crate::args::{MapArgs, ProblemArgs, Unknown};
+use crate::args::{MapArgs, ProblemArgs, SpeedArgs, Unknown};
 use crate::outcome::Failure;
 
 /// Maps of more cells are warned about: 4000 x 4000.
@@ -47,6 +49,25 @@ pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
         eprintln!("warning: {warning}");
     }
     Ok(map)
+}
+
+/// The speed limits that `args` ask for, for a robot with a top speed of `max_speed_mps`.
+pub(crate) fn speed_limits(
+    args: &SpeedArgs,
+    map: &MapArgs,
+    max_speed_mps: f64,
+) -> Result<Option<SpeedLimits>, Failure> {
+    let Some(path) = &args.speed_mask else { return Ok(None) };
+    let options = LoadOptions { allow_outside: map.allow_outside, ..LoadOptions::default() };
+    let mask = load_values(path, &options)?;
+    for warning in &mask.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let (base, multiplier) = (args.speed_base, args.speed_multiplier);
+    let rule = SpeedRule { base, multiplier, is_absolute: args.speed_absolute };
+    let limits = sharp_bench::speed_limits(&mask, rule, max_speed_mps);
+    let refused = |error| Failure::new("MAP_FIELD", format!("--speed-mask {}: {error}", path.display()));
+    limits.map(Some).map_err(refused)
 }
 
 /// The simulator called `name`.

@@ -165,6 +165,35 @@ fn a_solved_plan_runs_serves_and_repeats_byte_for_byte() {
     assert_eq!(first, second, "two processes that bump into walls");
 }
 
+#[test]
+fn a_page_to_look_at_is_written_where_it_is_wanted() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let data = |file: &str| -> Value {
+        let page = fs::read_to_string(folder.path().join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
+        let data = page.split("id=\"data\">").nth(1).unwrap().split("</script>").next().unwrap();
+        serde_json::from_str(data).unwrap()
+    };
+    let report = json(&solve_rooms(folder.path(), &["--library", "none", "--out", "one", "--show"]));
+    let shown = data("one/show.html");
+    assert_eq!((&shown["map"]["name"], &shown["runs"]["episodes"]), (&"rooms".into(), &200.into()));
+    let legs = |value: &Value| -> Vec<Value> {
+        value.as_array().unwrap().iter().map(|leg| leg["option"].clone()).collect()
+    };
+    assert_eq!(legs(&shown["legs"]), legs(&report["plan"]), "the plan that was found");
+    assert_eq!(shown["predicted"]["success"], report["predicted"]["success"]);
+    let run = sharp(folder.path(), &["--json", "run", "one", "--episodes", "3", "--show", "three.html"]);
+    let (run, shown) = (json(&run), data("three.html"));
+    assert_eq!((&shown["runs"]["episodes"], &shown["runs"]["reached"]), (&3.into(), &run["successes"]));
+    assert_eq!(shown["map"]["name"], "rooms");
+    for args in [&["run", "--show", "one"][..], &["run", "one", "--show", "page.txt"]] {
+        let output = sharp(folder.path(), args);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(said.contains("--show") && said.contains("ends in .html"), "{args:?}: {said}");
+    }
+}
+
 /// A report of `sharp run` without its wall times.
 fn untimed(mut report: Value) -> Value {
     report.as_object_mut().unwrap().remove("decision_us").expect("wall times are reported");

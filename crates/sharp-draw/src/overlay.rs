@@ -9,6 +9,7 @@ use sharp_space::{Cell, GridFrame, Occupancy, OccupancyGrid, Region};
 use crate::color::{STATES, color_states};
 use crate::outline::outline;
 use crate::png::PngError;
+use crate::scene::Viewport;
 
 /// Longest side of a layer, pixels: more than a screen shows.
 const SIDE_MAX_PX: usize = 2048;
@@ -20,6 +21,13 @@ const UNKNOWN_ALPHA: u8 = 64;
 pub const fn cells_per_pixel(frame: &GridFrame) -> usize {
     let side = if frame.width > frame.height { frame.width } else { frame.height };
     if side > SIDE_MAX_PX { side.div_ceil(SIDE_MAX_PX) } else { 1 }
+}
+
+/// The rectangle around all known cells with a margin: left, top, width and height, in cells; the whole map if nothing
+/// is known.
+#[must_use]
+pub fn known_cells(grid: &OccupancyGrid) -> [f64; 4] {
+    Viewport::of_known(grid).in_cells()
 }
 
 /// Walls as a PNG file: black, opaque where a cell is occupied, a quarter opaque where it is unknown, else

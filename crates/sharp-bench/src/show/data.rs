@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use sharp_draw::{cells_per_pixel, regions_outline, states_png, walls_png};
+use sharp_draw::{cells_per_pixel, known_cells, regions_outline, states_png, walls_png};
 use sharp_drive::EpisodeEnd;
 use sharp_guide::{GuidePath, LegId};
 use sharp_plan::{Moment, OptionLibrary, Plan, Recording};
@@ -49,6 +49,8 @@ pub(super) struct ShownMap {
     /// Size in cells.
     width: usize,
     height: usize,
+    /// The part that is known, with a margin: left, top, width and height in cells.
+    known: [f64; 4],
     /// Side of a pixel of the two pictures, cells.
     pixel_cells: usize,
     /// Walls opaque, unknown land a little, as a PNG.
@@ -208,6 +210,7 @@ fn map(shown: &Shown<'_>, plan: &Plan) -> Result<ShownMap, BenchError> {
         resolution_m: frame.resolution_m,
         width: frame.width,
         height: frame.height,
+        known: known_cells(grid),
         pixel_cells: cells_per_pixel(frame),
         walls: data_uri("image/png", &walls_png(grid)?),
         cells: data_uri("image/png", &states_png(grid, &|cell| states.state_of(cell).map(|state| state.0))?),

@@ -37,7 +37,7 @@ const arrows = options.map(option => {
 });
 const regions = new Path2D(map.regions);
 const planned = new Map(legs.map((leg, index) => [leg.option, index]));
-byId('frame').style.setProperty('--aspect', map.height / map.width);
+byId('frame').style.setProperty('--aspect', map.known[3] / map.known[2]);
 const lastTime = Math.max(1, ...drives.map(drive => drive.time_s));
 
 const layers = {};
@@ -86,10 +86,9 @@ byId('theme').onclick = () => theme(document.documentElement.dataset.theme === '
 // The window: its middle in cells, and pixels a cell.
 const view = { x: 0, y: 0, scale: 1, width: 0, height: 0, fitted: true };
 function fit() {
-  // All that the plan and the drives touch, with some room, but at least what is known of the map.
-  const [width, height] = [map.width, map.height];
+  const [left, top, width, height] = map.known;
   view.scale = Math.min(view.width / width, view.height / height) * 0.98;
-  [view.x, view.y] = [width / 2, height / 2];
+  [view.x, view.y] = [left + width / 2, top + height / 2];
   view.fitted = true;
 }
 function resize() {
@@ -97,13 +96,14 @@ function resize() {
   [view.width, view.height] = [box.width, box.height];
   [canvas.width, canvas.height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
   if (view.fitted) fit();
-  draw();
+  // At once: a canvas that gets another size is empty.
+  drawNow();
 }
 const toScreen = ([u, v]) => [(u - view.x) * view.scale + view.width / 2, (v - view.y) * view.scale + view.height / 2];
 const toCells = ([px, py]) => [(px - view.width / 2) / view.scale + view.x, (py - view.height / 2) / view.scale + view.y];
 function zoom(factor, [px, py] = [view.width / 2, view.height / 2]) {
   const [u, v] = toCells([px, py]);
-  const least = 0.5 * Math.min(view.width / map.width, view.height / map.height);
+  const least = 0.5 * Math.min(view.width / map.width, view.height / map.height, 1);
   view.scale = Math.min(Math.max(view.scale * factor, least), 400 * map.resolution_m);
   const [u2, v2] = toCells([px, py]);
   view.x += u - u2; view.y += v - v2;

@@ -48,19 +48,21 @@ pub(super) fn tightest(world: &World, guide: &GuidePath) -> Tight {
     Tight { at: place(at), beside_m: centimetres(beside_m) }
 }
 
-/// The weak places of what is shown: legs that failed, worst first, then the tightest place.
+/// The weak places of what is shown: where drives failed, the most failures first; other legs that failed in the
+/// verification, the worst first; the tightest place.
 pub(super) fn weak_places(shown: &Shown<'_>, legs: &Legs) -> Vec<WeakPlace> {
-    let mut weak: Vec<(f64, WeakPlace)> = failures(shown, legs);
-    let steps = steps(shown);
+    let (mut weak, steps) = (failures(shown, legs), steps(shown));
+    let mut unseen: Vec<(f64, WeakPlace)> = Vec::new();
     for (leg, step) in steps.iter().enumerate() {
         let SuccessCount { episodes, successes } = step.on_arrival;
-        if successes < episodes && weak.iter().all(|(_, place)| place.leg != Some(leg)) {
+        if successes < episodes && weak.iter().all(|place| place.leg != Some(leg)) {
             let words = format!("{}: {}.", step.option.id, counted(step.on_arrival));
-            weak.push((step.on_arrival.rate(), WeakPlace { words, at: None, leg: Some(leg), failed: false }));
+            unseen
+                .push((step.on_arrival.rate(), WeakPlace { words, at: None, leg: Some(leg), failed: false }));
         }
     }
-    weak.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut weak: Vec<WeakPlace> = weak.into_iter().map(|(_, place)| place).collect();
+    unseen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    weak.extend(unseen.into_iter().map(|(_, place)| place));
     if weak.is_empty() {
         let words = format!(
             "No leg failed, neither in the runs of the verification nor in {} drives.",
@@ -84,8 +86,8 @@ struct Failures {
     places: Vec<Point>,
 }
 
-/// Where drives failed, each place with the success of its leg.
-fn failures(shown: &Shown<'_>, legs: &Legs) -> Vec<(f64, WeakPlace)> {
+/// Where drives failed, the most failures first.
+fn failures(shown: &Shown<'_>, legs: &Legs) -> Vec<WeakPlace> {
     let mut groups: Vec<Failures> = Vec::new();
     for recording in shown.recordings.iter().filter(|it| it.execution.end != EpisodeEnd::Reached) {
         let Some(last) = recording.moments.last() else { continue };
@@ -99,6 +101,7 @@ fn failures(shown: &Shown<'_>, legs: &Legs) -> Vec<(f64, WeakPlace)> {
             None => groups.push(Failures { leg, end, places: vec![at] }),
         }
     }
+    groups.sort_by_key(|group| std::cmp::Reverse(group.places.len()));
     // What the verification counted is said once for each leg.
     let mut said: Vec<Option<usize>> = Vec::new();
     let describe = |group: Failures| {
@@ -114,11 +117,7 @@ fn leg_of(moments: &[Moment], legs: &Legs) -> Option<usize> {
     moments.last().and_then(|moment| legs.at(moment))
 }
 
-fn described(
-    Failures { leg, end, places }: &Failures,
-    is_first: bool,
-    shown: &Shown<'_>,
-) -> (f64, WeakPlace) {
+fn described(Failures { leg, end, places }: &Failures, is_first: bool, shown: &Shown<'_>) -> WeakPlace {
     let middle = places.iter().fold(Point::origin(), |sum, at| sum + at.coords / places.len() as f64);
     let [x, y] = place(middle);
     let what = match end {
@@ -133,8 +132,7 @@ fn described(
         Some(step) => format!("{}: {drives}.", step.option.id),
         None => format!("{drives}, on a way that was planned anew."),
     };
-    let success = step.map_or(1.0, |step| step.on_arrival.rate());
-    (success, WeakPlace { words, at: Some([x, y]), leg: *leg, failed: true })
+    WeakPlace { words, at: Some([x, y]), leg: *leg, failed: true }
 }
 
 /// What the verification counted of a leg.
