@@ -72,6 +72,12 @@ pub(crate) enum Subcommands {
         /// The shell.
         shell: clap_complete::Shell,
     },
+    /// Print the manual page, or write one for each command.
+    Man {
+        /// Write the pages of all commands there, as into ~/.local/share/man/man1 [default: print the first one].
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
 }
 
 /// Which map, and how to read it.
@@ -190,6 +196,9 @@ pub(crate) struct Solve {
     /// How policies are learnt.
     #[arg(long, value_enum, default_value_t = Learning::Fast)]
     pub(crate) learning: Learning,
+    /// The prior that options begin with, a file of `sharp prior train` [default: the shipped one of the robot's kind].
+    #[arg(long, value_name = "FILE")]
+    pub(crate) prior: Option<PathBuf>,
     /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,

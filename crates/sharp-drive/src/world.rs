@@ -8,6 +8,7 @@ use sharp_space::{FootprintChecker, OccupancyGrid, Pose, RobotGeometry};
 
 use crate::command::Command;
 use crate::motion_model::MotionModel;
+use crate::prior::Prior;
 use crate::speed_limits::SpeedLimits;
 
 /// A vehicle in a simulator that is chosen at run time.
@@ -28,6 +29,8 @@ pub struct World {
     pub inflated: Arc<[InflatedRobot]>,
     /// Speed limits by place, if there are any.
     pub speed_limits: Option<Arc<SpeedLimits>>,
+    /// The prior of this robot in place of the shipped one of its kind.
+    pub own_prior: Option<Arc<Prior>>,
     /// What the robot's actions do, as policies expect it.
     pub(crate) model: Arc<MotionModel>,
 }
@@ -47,13 +50,25 @@ impl World {
         let model = Arc::new(MotionModel::new(&robot));
         let inflated = inflated_robots(&geometry, robot.min_turning_radius_m()).into();
         let (grid, robot) = (Arc::new(grid), Arc::new(robot));
-        Self { grid, robot, geometry, obstacles, inflated, speed_limits: None, model }
+        Self { grid, robot, geometry, obstacles, inflated, speed_limits: None, own_prior: None, model }
     }
 
     /// The same with speed limits.
     #[must_use]
     pub fn with_speed_limits(self, limits: SpeedLimits) -> Self {
         Self { speed_limits: Some(Arc::new(limits)), ..self }
+    }
+
+    /// The same with a prior of its own.
+    #[must_use]
+    pub fn with_prior(self, prior: Prior) -> Self {
+        Self { own_prior: Some(Arc::new(prior)), ..self }
+    }
+
+    /// The prior that options begin with: the robot's own, or the shipped one of its kind.
+    #[must_use]
+    pub fn prior(&self) -> &Prior {
+        self.own_prior.as_deref().unwrap_or_else(|| Prior::shipped(&self.robot))
     }
 
     /// `command` for a robot at `pose`, no faster than the speed limits allow.

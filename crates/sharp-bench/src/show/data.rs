@@ -10,7 +10,7 @@ use sharp_plan::{Moment, OptionLibrary, Plan, Recording};
 use sharp_space::{Point, Pose};
 
 use super::Shown;
-use super::weak::{Tight, WeakPlace, tightest, weak_places};
+use super::weak::{Tight, ShownPlace, tightest, weak_places};
 use crate::data_uri::data_uri;
 use crate::error::BenchError;
 use crate::reports::OptionReport;
@@ -36,7 +36,7 @@ pub(super) struct ShownData {
     legs: Vec<ShownLeg>,
     runs: ShownRuns,
     drives: Vec<ShownDrive>,
-    weak: Vec<WeakPlace>,
+    weak: Vec<ShownPlace>,
 }
 
 /// The map. Its layers lie over each other, line 0 at the top.

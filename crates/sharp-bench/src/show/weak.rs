@@ -16,7 +16,7 @@ const STEP_M: f64 = 0.1;
 
 /// A weak place of the plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct WeakPlace {
+pub(super) struct ShownPlace {
     /// What is weak there.
     pub(super) words: String,
     /// Where; nowhere for a leg whose failures nobody saw.
@@ -50,15 +50,15 @@ pub(super) fn tightest(world: &World, guide: &GuidePath) -> Tight {
 
 /// The weak places of what is shown: where drives failed, the most failures first; other legs that failed in the
 /// verification, the worst first; the tightest place.
-pub(super) fn weak_places(shown: &Shown<'_>, legs: &Legs) -> Vec<WeakPlace> {
+pub(super) fn weak_places(shown: &Shown<'_>, legs: &Legs) -> Vec<ShownPlace> {
     let (mut weak, steps) = (failures(shown, legs), steps(shown));
-    let mut unseen: Vec<(f64, WeakPlace)> = Vec::new();
+    let mut unseen: Vec<(f64, ShownPlace)> = Vec::new();
     for (leg, step) in steps.iter().enumerate() {
         let SuccessCount { episodes, successes } = step.on_arrival;
         if successes < episodes && weak.iter().all(|place| place.leg != Some(leg)) {
             let words = format!("{}: {}.", step.option.id, counted(step.on_arrival));
             unseen
-                .push((step.on_arrival.rate(), WeakPlace { words, at: None, leg: Some(leg), failed: false }));
+                .push((step.on_arrival.rate(), ShownPlace { words, at: None, leg: Some(leg), failed: false }));
         }
     }
     unseen.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -68,7 +68,7 @@ pub(super) fn weak_places(shown: &Shown<'_>, legs: &Legs) -> Vec<WeakPlace> {
             "No leg failed, neither in the runs of the verification nor in {} drives.",
             shown.recordings.len()
         );
-        weak.push(WeakPlace { words, at: None, leg: None, failed: false });
+        weak.push(ShownPlace { words, at: None, leg: None, failed: false });
     }
     weak.extend(narrowest(shown, &steps));
     weak
@@ -87,7 +87,7 @@ struct Failures {
 }
 
 /// Where drives failed, the most failures first.
-fn failures(shown: &Shown<'_>, legs: &Legs) -> Vec<WeakPlace> {
+fn failures(shown: &Shown<'_>, legs: &Legs) -> Vec<ShownPlace> {
     let mut groups: Vec<Failures> = Vec::new();
     for recording in shown.recordings.iter().filter(|it| it.execution.end != EpisodeEnd::Reached) {
         let Some(last) = recording.moments.last() else { continue };
@@ -117,7 +117,7 @@ fn leg_of(moments: &[Moment], legs: &Legs) -> Option<usize> {
     moments.last().and_then(|moment| legs.at(moment))
 }
 
-fn described(Failures { leg, end, places }: &Failures, is_first: bool, shown: &Shown<'_>) -> WeakPlace {
+fn described(Failures { leg, end, places }: &Failures, is_first: bool, shown: &Shown<'_>) -> ShownPlace {
     let middle = places.iter().fold(Point::origin(), |sum, at| sum + at.coords / places.len() as f64);
     let [x, y] = place(middle);
     let what = match end {
@@ -132,7 +132,7 @@ fn described(Failures { leg, end, places }: &Failures, is_first: bool, shown: &S
         Some(step) => format!("{}: {drives}.", step.option.id),
         None => format!("{drives}, on a way that was planned anew."),
     };
-    WeakPlace { words, at: Some([x, y]), leg: *leg, failed: true }
+    ShownPlace { words, at: Some([x, y]), leg: *leg, failed: true }
 }
 
 /// What the verification counted of a leg.
@@ -146,7 +146,7 @@ fn counted(count: SuccessCount) -> String {
 }
 
 /// The tightest place of all legs.
-fn narrowest(shown: &Shown<'_>, steps: &[&PlannedOption]) -> Option<WeakPlace> {
+fn narrowest(shown: &Shown<'_>, steps: &[&PlannedOption]) -> Option<ShownPlace> {
     let world = &shown.tour.plans[0].world;
     let places = steps.iter().enumerate().map(|(leg, step)| (leg, tightest(world, &step.option.guide)));
     let (leg, tight) = places.min_by(|a, b| a.1.beside_m.total_cmp(&b.1.beside_m))?;
@@ -155,5 +155,5 @@ fn narrowest(shown: &Shown<'_>, steps: &[&PlannedOption]) -> Option<WeakPlace> {
         "Tightest place: {} at ({x}, {y}), {beside_m:.2} m between the robot's sides and the nearest wall.",
         steps[leg].option.id
     );
-    Some(WeakPlace { words, at: Some(tight.at), leg: Some(leg), failed: false })
+    Some(ShownPlace { words, at: Some(tight.at), leg: Some(leg), failed: false })
 }

@@ -6,6 +6,7 @@ pub(crate) mod eval;
 pub(crate) mod export;
 pub(crate) mod jobs;
 pub(crate) mod library;
+pub(crate) mod man;
 pub(crate) mod map;
 pub(crate) mod prior;
 pub(crate) mod regions;

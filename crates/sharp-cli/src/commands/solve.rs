@@ -9,6 +9,7 @@ use sharp_plan::{Method, Monitor, OptionLibrary, Tour};
 use sharp_space::Pose;
 
 use crate::args::{Guide, Solve, Switch};
+use crate::commands::prior::prior_file;
 use crate::commands::show;
 use crate::input::{self, HeadingRule};
 use crate::outcome::{Exit, Failure, say, to_json};
@@ -33,6 +34,9 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     let mut problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
     if let Some(limits) = input::speed_limits(&args.speed, &args.map, problem.world.robot.max_speed_mps)? {
         problem.world = problem.world.with_speed_limits(limits);
+    }
+    if let Some(file) = &args.prior {
+        problem.world = problem.world.with_prior(prior_file(file)?);
     }
     let settings = SolveSettings {
         abstraction: args.abstraction.request(),
