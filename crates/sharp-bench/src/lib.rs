@@ -80,7 +80,7 @@ pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
 };
 pub use robot_import::{ImportError, ImportWishes, ImportedField, ImportedRobot, import_robot};
-pub use show::Shown;
+pub use show::PlanPage;
 pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
 pub use speed_mask::{SpeedMaskError, SpeedRule, speed_limits};
 pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};

@@ -74,7 +74,8 @@ pub fn speed_limits(
         if !rule.is_absolute && number > 100.0 {
             return Err(refused(value, format!("{number} %"), "at most 100 %"));
         }
-        if !(limit_mps >= sharp_drive::SPEED_LIMIT_MIN_MPS) {
+        let is_speed = limit_mps >= sharp_drive::SPEED_LIMIT_MIN_MPS;
+        if !is_speed {
             let expected = "at least 0.05 m/s; a place to keep out of belongs into --keepout";
             return Err(refused(value, format!("{number} {unit}"), expected));
         }

@@ -168,7 +168,14 @@ pub(crate) fn query(map: &MapFile, args: &ProblemArgs) -> Result<Query, Failure>
     match (start, goal) {
         (Some((start, true)), Some(goal)) => Ok(Query { start, goal }),
         (Some((start, false)), Some(goal)) => Ok(towards(start.position, goal.position)),
-        _ => Err(Failure::new("USAGE", "either --start and --goal or --problem is needed")),
+        _ => {
+            let bounds = map.grid.frame().bounds();
+            let [low, high] = [bounds.min, bounds.max].map(|at| format!("({:.1}, {:.1})", at.x, at.y));
+            let message = format!(
+                "either --start X,Y,YAW and --goal X,Y or --problem is needed; the map reaches from {low} to {high}"
+            );
+            Err(Failure::new("USAGE", message))
+        }
     }
 }
 

@@ -194,6 +194,39 @@ fn a_page_to_look_at_is_written_where_it_is_wanted() {
     }
 }
 
+#[test]
+fn completions_and_manual_pages_know_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |args: &[&str]| {
+        let output = sharp(folder.path(), args);
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let help = text(&["--help"]);
+    let listed = help.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
+    let names: Vec<&str> = listed
+        .lines()
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|&name| name != "help")
+        .collect();
+    assert!(names.len() >= 15 && names.contains(&"solve") && names.contains(&"man"), "{names:?}");
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = text(&["completions", shell]);
+        let missing: Vec<_> = names.iter().filter(|name| !script.contains(**name)).collect();
+        assert!(missing.is_empty(), "{shell} does not know {missing:?}");
+    }
+    let pages: Value = serde_json::from_str(&text(&["--json", "man", "--out", "man"])).unwrap();
+    let pages: Vec<&str> = pages["pages"].as_array().unwrap().iter().map(|it| it.as_str().unwrap()).collect();
+    for name in names {
+        assert!(pages.contains(&&*format!("sharp-{name}.1")), "{name} has no page among {pages:?}");
+    }
+    assert!(pages.contains(&"sharp-map-save.1"), "commands below commands have pages: {pages:?}");
+    let page = fs::read_to_string(folder.path().join("man/sharp-solve.1")).unwrap();
+    assert!(page.contains(".TH sharp-solve 1") && page.contains("speed\\-mask"), "{page}");
+    assert!(text(&["man"]).contains(".TH sharp 1"), "the first page, on standard output");
+}
+
 /// A report of `sharp run` without its wall times.
 fn untimed(mut report: Value) -> Value {
     report.as_object_mut().unwrap().remove("decision_us").expect("wall times are reported");

@@ -81,7 +81,8 @@ fn run(document: &str) {
         if let Some(file) = &block.file {
             fs::write(folder.path().join(file), &block.text).expect("a file");
             if file.ends_with(".py") {
-                failures.extend(compiled(folder.path(), file).err().map(|said| format!("{document}: {said}")));
+                failures
+                    .extend(compiled(folder.path(), file).err().map(|said| format!("{document}: {said}")));
             }
         }
         if block.language != "sh" {
@@ -92,7 +93,9 @@ fn run(document: &str) {
             continue;
         }
         let needs_python = block.text.contains("python3 ");
-        if needs_python && !Command::new("python3").arg("--version").output().is_ok_and(|it| it.status.success()) {
+        if needs_python
+            && !Command::new("python3").arg("--version").output().is_ok_and(|it| it.status.success())
+        {
             eprintln!("SKIPPED: {document}:{}: there is no Python", block.line);
             continue;
         }

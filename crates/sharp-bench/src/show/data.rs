@@ -9,8 +9,8 @@ use sharp_guide::{GuidePath, LegId};
 use sharp_plan::{Moment, OptionLibrary, Plan, Recording};
 use sharp_space::{Point, Pose};
 
-use super::Shown;
-use super::weak::{Tight, ShownPlace, tightest, weak_places};
+use super::PlanPage;
+use super::weak::{ShownPlace, Tight, tightest, weak_places};
 use crate::data_uri::data_uri;
 use crate::error::BenchError;
 use crate::reports::OptionReport;
@@ -25,7 +25,7 @@ const MOMENTS_MAX: usize = 400;
 pub(super) struct ShownData {
     schema: &'static str,
     pub(super) map: ShownMap,
-    pub(super) robot: ShownRobot,
+    pub(super) robot: ShownOutline,
     /// Where the robot begins: x, y, yaw.
     start: [f64; 3],
     /// Where it is to go, in order.
@@ -61,8 +61,9 @@ pub(super) struct ShownMap {
     regions: String,
 }
 
+/// The robot.
 #[derive(Debug, Serialize)]
-pub(super) struct ShownRobot {
+pub(super) struct ShownOutline {
     pub(super) name: String,
     /// Its outline around its reference point, looking along x.
     outline: Vec<[f64; 2]>,
@@ -143,8 +144,8 @@ struct ShownDrive {
 }
 
 impl ShownData {
-    pub(super) fn new(shown: &Shown<'_>) -> Result<Self, BenchError> {
-        let Shown { tour, recordings, .. } = *shown;
+    pub(super) fn new(shown: &PlanPage<'_>) -> Result<Self, BenchError> {
+        let PlanPage { tour, recordings, .. } = *shown;
         let (first, last) = (&tour.plans[0], &tour.plans[tour.plans.len() - 1]);
         let robot = &first.world.robot;
         let at_origin = Pose::new(0.0, 0.0, 0.0);
@@ -153,7 +154,7 @@ impl ShownData {
         Ok(Self {
             schema: "sharp.show/1",
             map: map(shown, first)?,
-            robot: ShownRobot {
+            robot: ShownOutline {
                 name: robot.name.clone(),
                 outline: robot.footprint.outline(&at_origin).into_iter().map(place).collect(),
                 goal_tolerance_m: last.world.robot.goal_tolerance_m,
@@ -187,7 +188,7 @@ impl ShownData {
 pub(super) struct Legs(BTreeMap<(usize, LegId), usize>);
 
 impl Legs {
-    fn new(shown: &Shown<'_>) -> Self {
+    fn new(shown: &PlanPage<'_>) -> Self {
         let plans = shown.tour.plans.iter().enumerate();
         let steps =
             plans.flat_map(|(plan, it)| it.solution.steps.iter().map(move |step| (plan, step.option.id)));
@@ -200,7 +201,7 @@ impl Legs {
     }
 }
 
-fn map(shown: &Shown<'_>, plan: &Plan) -> Result<ShownMap, BenchError> {
+fn map(shown: &PlanPage<'_>, plan: &Plan) -> Result<ShownMap, BenchError> {
     let (grid, states) = (&plan.world.grid, &*plan.abstraction.states);
     let frame = grid.frame();
     Ok(ShownMap {
@@ -247,7 +248,7 @@ fn options(plan: &Plan, library: Option<&OptionLibrary>) -> Vec<ShownOption> {
     all.collect()
 }
 
-fn shown_legs(shown: &Shown<'_>) -> Vec<ShownLeg> {
+fn shown_legs(shown: &PlanPage<'_>) -> Vec<ShownLeg> {
     let plans = shown.tour.plans.iter().enumerate();
     let legs = plans.flat_map(|(goal, plan)| {
         let reports = OptionReport::all(plan).into_iter().zip(&plan.solution.steps);

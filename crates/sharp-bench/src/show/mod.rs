@@ -25,7 +25,7 @@ const SCRIPT: &str = include_str!("page.js");
 
 /// What a page shows.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown<'a> {
+pub struct PlanPage<'a> {
     /// The name of the map.
     pub map: &'a str,
     /// The plan, or several in a row.
@@ -36,7 +36,7 @@ pub struct Shown<'a> {
     pub library: Option<&'a OptionLibrary>,
 }
 
-impl Shown<'_> {
+impl PlanPage<'_> {
     /// Drives that a page is usually made of: enough to meet a failure that happens once in a hundred.
     pub const EPISODES: u32 = 200;
 
@@ -44,7 +44,7 @@ impl Shown<'_> {
     ///
     /// # Errors
     /// If a picture of the map cannot be made.
-    pub fn page(&self) -> Result<String, BenchError> {
+    pub fn to_html(&self) -> Result<String, BenchError> {
         let data = ShownData::new(self)?;
         // Inside a script element nothing may look like the end of it.
         let json = to_json(&data).replace('<', "\\u003c");

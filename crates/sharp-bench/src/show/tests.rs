@@ -1,3 +1,5 @@
+//! The page as data: what its JSON says of the plan and its drives.
+
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -44,8 +46,8 @@ pub(super) fn recorded(tour: &Tour, time_limit_s: f64) -> Vec<Recording> {
 }
 
 pub(super) fn page(tour: &Tour, recordings: &[Recording]) -> String {
-    let shown = Shown { map: "two </script> rooms", tour, recordings, library: None };
-    shown.page().expect("a page")
+    let shown = PlanPage { map: "two </script> rooms", tour, recordings, library: None };
+    shown.to_html().expect("a page")
 }
 
 /// The numbers in `page`.

@@ -6,7 +6,7 @@ use sharp_guide::GuidePath;
 use sharp_plan::{Moment, PlannedOption};
 use sharp_space::Point;
 
-use super::Shown;
+use super::PlanPage;
 use super::data::{Legs, centimetres, place};
 
 /// Failures of the same leg and kind that are nearer to each other than this count as one place, metres.
@@ -50,15 +50,17 @@ pub(super) fn tightest(world: &World, guide: &GuidePath) -> Tight {
 
 /// The weak places of what is shown: where drives failed, the most failures first; other legs that failed in the
 /// verification, the worst first; the tightest place.
-pub(super) fn weak_places(shown: &Shown<'_>, legs: &Legs) -> Vec<ShownPlace> {
+pub(super) fn weak_places(shown: &PlanPage<'_>, legs: &Legs) -> Vec<ShownPlace> {
     let (mut weak, steps) = (failures(shown, legs), steps(shown));
     let mut unseen: Vec<(f64, ShownPlace)> = Vec::new();
     for (leg, step) in steps.iter().enumerate() {
         let SuccessCount { episodes, successes } = step.on_arrival;
         if successes < episodes && weak.iter().all(|place| place.leg != Some(leg)) {
             let words = format!("{}: {}.", step.option.id, counted(step.on_arrival));
-            unseen
-                .push((step.on_arrival.rate(), ShownPlace { words, at: None, leg: Some(leg), failed: false }));
+            unseen.push((
+                step.on_arrival.rate(),
+                ShownPlace { words, at: None, leg: Some(leg), failed: false },
+            ));
         }
     }
     unseen.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -75,7 +77,7 @@ pub(super) fn weak_places(shown: &Shown<'_>, legs: &Legs) -> Vec<ShownPlace> {
 }
 
 /// The steps of all plans in a row.
-fn steps<'a>(shown: &Shown<'a>) -> Vec<&'a PlannedOption> {
+fn steps<'a>(shown: &PlanPage<'a>) -> Vec<&'a PlannedOption> {
     shown.tour.plans.iter().flat_map(|plan| &plan.solution.steps).collect()
 }
 
@@ -87,7 +89,7 @@ struct Failures {
 }
 
 /// Where drives failed, the most failures first.
-fn failures(shown: &Shown<'_>, legs: &Legs) -> Vec<ShownPlace> {
+fn failures(shown: &PlanPage<'_>, legs: &Legs) -> Vec<ShownPlace> {
     let mut groups: Vec<Failures> = Vec::new();
     for recording in shown.recordings.iter().filter(|it| it.execution.end != EpisodeEnd::Reached) {
         let Some(last) = recording.moments.last() else { continue };
@@ -117,7 +119,7 @@ fn leg_of(moments: &[Moment], legs: &Legs) -> Option<usize> {
     moments.last().and_then(|moment| legs.at(moment))
 }
 
-fn described(Failures { leg, end, places }: &Failures, is_first: bool, shown: &Shown<'_>) -> ShownPlace {
+fn described(Failures { leg, end, places }: &Failures, is_first: bool, shown: &PlanPage<'_>) -> ShownPlace {
     let middle = places.iter().fold(Point::origin(), |sum, at| sum + at.coords / places.len() as f64);
     let [x, y] = place(middle);
     let what = match end {
@@ -146,7 +148,7 @@ fn counted(count: SuccessCount) -> String {
 }
 
 /// The tightest place of all legs.
-fn narrowest(shown: &Shown<'_>, steps: &[&PlannedOption]) -> Option<ShownPlace> {
+fn narrowest(shown: &PlanPage<'_>, steps: &[&PlannedOption]) -> Option<ShownPlace> {
     let world = &shown.tour.plans[0].world;
     let places = steps.iter().enumerate().map(|(leg, step)| (leg, tightest(world, &step.option.guide)));
     let (leg, tight) = places.min_by(|a, b| a.1.beside_m.total_cmp(&b.1.beside_m))?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use sharp_bench::{RunReport, Shown, clock_us, named, pictures};
+use sharp_bench::{PlanPage, RunReport, clock_us, named, pictures};
 use sharp_export::driven_mcap;
 use sharp_maps::{LoadOptions, load};
 use sharp_plan::{Execution, Plan, Tour, write_atomic};
@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     }
     if let Some(file) = &args.show {
         let map = map_name(&args.plan_dir);
-        let shown = Shown { map: &map, tour: &tour, recordings: &recordings, library: None };
+        let shown = PlanPage { map: &map, tour: &tour, recordings: &recordings, library: None };
         let path = show::write(&shown, &args.plan_dir, file.as_deref())?;
         eprintln!("page written to {}", path.display());
     }

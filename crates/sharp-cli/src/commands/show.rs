@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use sharp_bench::{Shown, clock_us};
+use sharp_bench::{PlanPage, clock_us};
 use sharp_plan::{OptionLibrary, Tour, write_atomic};
 use sharp_space::Seed;
 
@@ -17,14 +17,14 @@ pub(crate) fn solved(
     (folder, file): (&Path, Option<&Path>),
 ) -> Result<PathBuf, Failure> {
     let spinner = spinner("driving");
-    let recordings = tour.record(&tour.run_settings(Shown::EPISODES, Seed(seed)), &clock_us());
+    let recordings = tour.record(&tour.run_settings(PlanPage::EPISODES, Seed(seed)), &clock_us());
     spinner.finish_and_clear();
-    write(&Shown { map, tour, recordings: &recordings, library }, folder, file)
+    write(&PlanPage { map, tour, recordings: &recordings, library }, folder, file)
 }
 
 /// Writes the page of `shown` to `file`, or into the plan's `folder`; returns its path.
-pub(crate) fn write(shown: &Shown<'_>, folder: &Path, file: Option<&Path>) -> Result<PathBuf, Failure> {
+pub(crate) fn write(shown: &PlanPage<'_>, folder: &Path, file: Option<&Path>) -> Result<PathBuf, Failure> {
     let path = file.map_or_else(|| folder.join("show.html"), Path::to_owned);
-    write_atomic(&path, shown.page()?.as_bytes())?;
+    write_atomic(&path, shown.to_html()?.as_bytes())?;
     Ok(path)
 }
