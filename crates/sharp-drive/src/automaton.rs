@@ -5,10 +5,11 @@
 
 use std::sync::Arc;
 
-use sharp_guide::{GuidePath, GuidedOption};
+use sharp_guide::{Departure, GuidePath, GuidedOption};
 use sharp_sim::RobotState;
 
-use crate::episode::Motion;
+use crate::departure::careful;
+use crate::episode::{Decision, Motion};
 use crate::situation::{GuideProgress, GuideView, Observation, Situation};
 use crate::world::World;
 
@@ -145,12 +146,29 @@ impl Automaton {
     pub fn observe(&mut self, world: &World, motion: &Motion) {
         self.observation = self.observation.after(world, motion);
         let index = self.index();
-        self.progress.update(&self.links[index].option.guide, &motion.after.pose);
+        let (guide, pose) = (&self.links[index].option.guide, &motion.after.pose);
+        match motion.command {
+            Some(_) => self.progress.update(guide, pose),
+            // Who has backed off may be at another place of the guide than its window shows.
+            None => self.progress = GuideProgress::start(guide, pose),
+        }
         self.visits[index].time_s += motion.time_s;
         self.actions += 1;
         if let Some(limits) = &world.speed_limits {
             self.spared += 1.0 - limits.counts(motion.after.pose.position);
         }
+    }
+
+    /// What the robot has to do before a policy may drive: leave the tight place in which the plan begins. `None` as
+    /// soon as it has left.
+    #[must_use]
+    pub fn leave(&self, world: &World) -> Option<Decision> {
+        let Departure { back_off_m, careful_m } = self.link().option.departure;
+        if self.actions == 0 && back_off_m > 0.0 {
+            return Some(Decision::BackOff { distance_m: back_off_m });
+        }
+        let is_leaving = self.progress.arc_m < careful_m;
+        is_leaving.then(|| Decision::Drive(careful(&self.situation(world))))
     }
 
     /// Returns true if the option that runs has used up its horizon.

@@ -89,6 +89,9 @@ impl Controller for ChainController<'_> {
         if self.automaton.is_late() {
             return Decision::Lost;
         }
+        if let Some(decision) = self.automaton.leave(self.world) {
+            return decision;
+        }
         let (index, situation) = (self.automaton.index(), self.automaton.situation(self.world));
         let policy = &mut self.policies[index];
         if self.entered <= index {

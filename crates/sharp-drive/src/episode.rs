@@ -49,8 +49,11 @@ impl Motion {
 pub enum Decision {
     /// Drive towards a waypoint for one action.
     Drive(Command),
-    /// Reverse out of a contact, as far as the robot's data allow.
-    BackOff,
+    /// Reverse straight, as far as the robot's data allow.
+    BackOff {
+        /// How far, metres.
+        distance_m: f64,
+    },
     /// Nothing more: the goal is reached.
     Reached,
     /// Nothing more: no way leads on, or time is up.
@@ -245,9 +248,8 @@ impl Episode {
         self.note(Motion::of(Some(command), &report))
     }
 
-    /// Reverses out of a contact, as far as the robot's data allow; one that never reverses waits for one action.
-    pub fn back_off(&mut self) -> Motion {
-        let distance_m = self.vehicle.robot().recovery_reverse_m;
+    /// Reverses straight, as far as the robot's data allow; one that never reverses waits for one action.
+    pub fn back_off(&mut self, distance_m: f64) -> Motion {
         let mut motion = Motion::of(None, &self.vehicle.back_off(distance_m));
         if motion.time_s == 0.0 {
             motion.time_s = self.vehicle.settings().action_s;
@@ -255,11 +257,22 @@ impl Episode {
         self.note(motion)
     }
 
+    /// Carries out what a controller decided, or says how it ended the episode.
+    pub(crate) fn carry_out(&mut self, decision: Decision) -> Result<Motion, EpisodeEnd> {
+        match decision {
+            Decision::Drive(command) => Ok(self.act(command)),
+            Decision::BackOff { distance_m } => Ok(self.back_off(distance_m)),
+            Decision::Reached => Err(EpisodeEnd::Reached),
+            Decision::Lost => Err(EpisodeEnd::Lost),
+        }
+    }
+
     fn note(&mut self, motion: Motion) -> Motion {
         let record = &mut self.record;
         record.time_s += motion.time_s;
         record.path_m += motion.path_m;
-        record.contacts += u32::from(motion.contact && motion.command.is_some());
+        let is_new = motion.command.is_some() || self.rules.contact_ends;
+        record.contacts += u32::from(motion.contact && is_new);
         if self.rules.keep_trace {
             record.trace.push(motion.after.pose);
         }
@@ -269,14 +282,14 @@ impl Episode {
     /// Lets `controller` drive until the episode ends.
     pub fn drive(&mut self, controller: &mut dyn Controller, supervisor: &Supervisor<'_>) -> EpisodeEnd {
         while self.record.time_s < self.rules.time_limit_s && !(supervisor.should_stop)() {
-            let motion = match self.decide(controller, supervisor) {
-                Decision::Drive(command) => self.act(command),
-                Decision::BackOff => self.back_off(),
-                Decision::Reached => return EpisodeEnd::Reached,
-                Decision::Lost => return EpisodeEnd::Lost,
+            let decision = self.decide(controller, supervisor);
+            let motion = match self.carry_out(decision) {
+                Ok(motion) => motion,
+                Err(end) => return end,
             };
             controller.observe(&motion);
-            if motion.contact && motion.command.is_some() && self.rules.contact_ends {
+            // Where contact ends an episode, nobody backs off from one: it came while backing off.
+            if motion.contact && self.rules.contact_ends {
                 return EpisodeEnd::Collided;
             }
         }
@@ -322,7 +335,7 @@ mod tests {
         fn decide(&mut self) -> Decision {
             if std::mem::take(&mut self.bumped) {
                 self.backed_off += 1;
-                return Decision::BackOff;
+                return Decision::BackOff { distance_m: 0.4 };
             }
             Decision::Drive(Command { reach_m: 0.5, bearing_rad: 0.0, speed_mps: self.speed_mps })
         }

@@ -33,6 +33,7 @@ mod chain;
 mod command;
 mod cost;
 mod count;
+mod departure;
 mod episode;
 mod estimate;
 mod features;
@@ -61,6 +62,7 @@ pub use chain::{ChainRun, Driver};
 pub use command::Command;
 pub use cost::{CostModel, DriveRow, GuideEnds, PredictedCost, RiskSamples, TimeSamples, drive_rows};
 pub use count::SuccessCount;
+pub use departure::CAREFUL_MPS;
 pub use episode::{
     Controller, Decision, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Motion, Readiness, Supervisor,
     TIME_LIMIT_MIN_S,

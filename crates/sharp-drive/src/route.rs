@@ -134,7 +134,7 @@ impl Controller for RouteController<'_> {
 
     fn decide(&mut self) -> Decision {
         if std::mem::take(&mut self.must_back_off) {
-            return Decision::BackOff;
+            return Decision::BackOff { distance_m: self.world.robot.recovery_reverse_m };
         }
         if self.is_at_goal() {
             return Decision::Reached;
@@ -193,7 +193,7 @@ mod tests {
             let after = RobotState::at_rest(Pose::new(x, y, 0.0));
             controller.observe(&Motion { contact, ..Motion::commanded(Command::default(), after) });
             if contact {
-                assert_eq!(controller.decide(), Decision::BackOff, "first away from the wall");
+                assert!(matches!(controller.decide(), Decision::BackOff { .. }), "first away from the wall");
             }
             controller.prepare()
         };

@@ -220,7 +220,12 @@ impl RunningTask {
         let rules = EpisodeRules::default().with_contact_ends(reward.contact_ends());
         let mut episode = Episode::new(world.vehicle(&*simulator, &noise, rules.contact_ends), rules);
         episode.begin(start, seed, number);
-        let automaton = Automaton::new(links, Observation::first(start, &noise).without_slip_estimate());
+        let mut automaton = Automaton::new(links, Observation::first(start, &noise).without_slip_estimate());
+        // The learner begins where its guide does.
+        while let Some(decision) = automaton.leave(&world).filter(|_| !automaton.is_late()) {
+            let Ok(motion) = episode.carry_out(decision) else { break };
+            automaton.observe(&world, &motion);
+        }
         Self { world, interface, reward, horizon_share, episode, automaton }
     }
 

@@ -12,6 +12,7 @@ use sharp_options::{AllowedRule, Endpoint, EndpointId, OptionId, OptionSet};
 use sharp_rbvd::{StateAbstraction, StateId};
 use sharp_space::{Cell, GridFrame, OccupancyGrid, Point, Pose};
 
+use crate::departure::Departure;
 use crate::goal::Goal;
 use crate::path::GuidePath;
 use crate::reward::Place;
@@ -153,6 +154,8 @@ pub struct GuidedOption {
     pub to: StateId,
     /// The guide path 𝒢 from the centre of its initiation set to that of its termination set.
     pub guide: GuidePath,
+    /// What comes before the guide; nothing, unless the start of a plan is a tight place.
+    pub departure: Departure,
     /// Its termination set β.
     pub target: Target,
     /// The states it may use without straying.
@@ -189,11 +192,18 @@ impl GuidedOption {
             from,
             to,
             guide,
+            departure: Departure::default(),
             target: target.map_or(Target::Goal(goal), |id| Target::Endpoint(endpoint(id))),
             allowed: space.allowed_states(id, from, to),
             source: source.map(endpoint),
             states: Arc::clone(&space.states),
         }
+    }
+
+    /// The same option, left by `departure`.
+    #[must_use]
+    pub fn with_departure(self, departure: Departure) -> Self {
+        Self { departure, ..self }
     }
 
     /// Returns true if a robot at `pose` has finished the option: x ∈ β.

@@ -32,9 +32,12 @@ pub fn join_guides(
     robot: &GuideRobot<'_>,
     settings: &GuideSettings,
 ) -> Vec<Arc<GuidedOption>> {
-    if options.len() < 2 {
+    let departure = options.first().map(|option| option.departure).unwrap_or_default();
+    // The beginning of a guide that is driven with care must stay as it is.
+    if options.len() < 2 || departure.careful_m > 0.0 {
         return options;
     }
+    let start = departure.after_back_off(start);
     match joined(&options, start, robot, settings) {
         Some(guides) => {
             let with = |(option, guide): (&Arc<GuidedOption>, GuidePath)| {

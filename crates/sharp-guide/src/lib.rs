@@ -27,6 +27,7 @@ pub mod conformance;
 mod band;
 mod context;
 mod crossing;
+mod departure;
 mod goal;
 mod guided_option;
 mod inflate;
@@ -43,6 +44,7 @@ mod settings;
 mod traversable;
 
 pub use crossing::crossing_heading;
+pub use departure::{Departure, departures, is_tight};
 pub use goal::Goal;
 pub use guided_option::{GuidedOption, LegId, OptionSpace, Role, Target};
 pub use inflate::{GuideRobot, InflatedRobot, inflated_robots};

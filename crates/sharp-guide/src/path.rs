@@ -108,6 +108,14 @@ impl GuidePath {
         Ok(Self { poses, spacing_m, arcs_m })
     }
 
+    /// The path from `arc_m` on, metres; `None` where nothing of it is left.
+    #[must_use]
+    pub fn from_arc(&self, arc_m: f64) -> Option<Self> {
+        let rest = (0..self.poses.len()).filter(|&i| self.arcs_m[i] > arc_m);
+        let poses = std::iter::once(self.pose_at(arc_m)).chain(rest.map(|i| self.poses[i])).collect();
+        Self::new(poses, self.spacing_m).ok()
+    }
+
     /// The points p₁ … pₙ.
     #[must_use]
     pub fn poses(&self) -> &[Pose] {

@@ -63,7 +63,7 @@ fn algorithm_1(
     // 8: s_i, s_g <- get_abstract_states(x_i, x_g)
     let known = Policies::guides(library);
     let mut search = match Search::new(world, abstraction, method, &conditions.noise, query, known, seed) {
-        Ok(search) => search,
+        Ok(search) => search.with_trials(conditions),
         Err(unplaced) => return Ok(Outcome::NoPlan(describe(problem, &unplaced.to_string()))),
     };
     let mut policies = Policies::new(library);

@@ -129,6 +129,9 @@ impl ComposedPolicy {
 
     /// The decision of the option's policy, whether or not its end is reached.
     pub(crate) fn drive(&mut self) -> Decision {
+        if let Some(decision) = self.automaton.leave(&self.plan.world) {
+            return decision;
+        }
         let (index, situation) = (self.automaton.index(), self.automaton.situation(&self.plan.world));
         let policy = &mut self.policies[index];
         if self.entered <= index {
@@ -203,7 +206,7 @@ impl Controller for ComposedPolicy {
         self.is_recovering = true;
         // Out of contact first: a forward-only robot with its nose at a wall cannot turn.
         if self.has_collided && self.plan.world.robot.recovery_reverse_m > 0.0 {
-            return Decision::BackOff;
+            return Decision::BackOff { distance_m: self.plan.world.robot.recovery_reverse_m };
         }
         self.drive()
     }
@@ -255,7 +258,7 @@ mod tests {
                         RobotState::at_rest(Pose::new(point.x, point.y, trig::atan2(towards.y, towards.x)));
                     arrive(policy, state);
                 }
-                Decision::BackOff => panic!("nobody met a wall"),
+                Decision::BackOff { .. } => panic!("nobody met a wall"),
                 Decision::Reached | Decision::Lost => {
                     legs.dedup();
                     return (decision, legs);

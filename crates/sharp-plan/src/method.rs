@@ -108,6 +108,10 @@ pub struct SearchSettings {
     pub bypasses: bool,
     /// A plan may also go from start to goal without any option, where that is cheaper; false keeps to the paper's.
     pub direct: bool,
+    /// A robot that stands in a tight place may back off or drive an arc before its guide begins; false keeps to the
+    /// paper's.
+    #[serde(default = "yes")]
+    pub departures: bool,
     /// Learnt options cost what was measured of them (line 17 of Algorithm 1); false keeps the first costs.
     pub cost_update: bool,
     /// Largest turn between two guides that a robot which turns in place makes without stopping, radians.
@@ -116,6 +120,11 @@ pub struct SearchSettings {
     pub allowed: AllowedRule,
     /// How guides are planned, where the planner is ours.
     pub guide: GuideSettings,
+}
+
+/// What files from before there was a choice mean.
+const fn yes() -> bool {
+    true
 }
 
 impl Default for SearchSettings {
@@ -128,6 +137,7 @@ impl Default for SearchSettings {
             bypass_surcharge_s: 14.0,
             bypasses: true,
             direct: true,
+            departures: true,
             cost_update: true,
             // The footprint swings out in a turn: beyond 75 degrees it needs clearance or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),
@@ -172,6 +182,7 @@ impl Method {
                 untrained_surcharge_s: 0.0,
                 bypasses: false,
                 direct: false,
+                departures: false,
                 allowed: AllowedRule::Paper,
                 ..SearchSettings::default()
             },

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sharp_drive::{SpeedLimits, SuccessCount, SuccessEstimate, World};
-use sharp_guide::{Goal, GuidePath, GuidedOption, LegId, OptionSpace};
+use sharp_guide::{Departure, Goal, GuidePath, GuidedOption, LegId, OptionSpace};
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_rbvd::{Rbvd, StateAbstraction, StateId};
 use sharp_sim::{NoiseModel, RobotModel};
@@ -146,6 +146,8 @@ struct StepFile {
     from: StateId,
     to: StateId,
     guide: GuidePath,
+    #[serde(default, skip_serializing_if = "Departure::is_none")]
+    departure: Departure,
     policy: PolicyFile,
     verified: SuccessCount,
     mean_time_s: f64,
@@ -164,7 +166,7 @@ impl Plan {
         let pricer = Pricer::new(world, noise, method.search, method.failure_cost_s);
         let price_s = |(index, step): (usize, &PlannedOption)| {
             let next = solution.steps.get(index + 1).map(|next| &next.option.guide);
-            pricer.cost_s(&pricer.price(step.option.id, &step.option.guide, next), None)
+            pricer.cost_s(&pricer.price(&step.option, next), None)
         };
         solution.steps.iter().enumerate().map(price_s).collect()
     }
@@ -239,6 +241,7 @@ fn step_file(step: &PlannedOption, folder: &Path) -> Result<StepFile, FileError>
         from: option.from,
         to: option.to,
         guide: option.guide.clone(),
+        departure: option.departure,
         policy: PolicyFile::save(&learnt.policy, folder)?,
         verified: learnt.estimate.count,
         mean_time_s: learnt.estimate.mean_time_s,
@@ -262,7 +265,8 @@ fn planned_option(
         env_steps: file.env_steps,
         gradient_steps: file.gradient_steps,
     };
-    let option = GuidedOption::new(space, file.id, (file.from, file.to), file.guide, goal);
+    let option = GuidedOption::new(space, file.id, (file.from, file.to), file.guide, goal)
+        .with_departure(file.departure);
     Ok(PlannedOption {
         option: Arc::new(option),
         learnt,

@@ -1,17 +1,22 @@
 //! What an option costs: before it was driven, and with what was measured since.
 
 use sharp_drive::{
-    CostModel, GuideEnds, GuideView, Prior, ProfiledFollower, SpeedProfile, SuccessEstimate, World,
-    expected_cost_s,
+    CAREFUL_MPS, CostModel, GuideEnds, GuideView, OptionPolicy, Prior, ProfiledFollower, SpeedProfile,
+    SuccessEstimate, World, expected_cost_s,
 };
-use sharp_guide::{GuidePath, LegId, Role};
-use sharp_sim::NoiseModel;
+use sharp_guide::{Departure, GuidePath, GuidedOption, LegId, Role};
+use sharp_sim::{BACK_OFF_MPS, NoiseModel};
 
 use crate::method::{PriceRule, SearchSettings};
 
 /// Time of a learnt policy as a share of the tuned speed profile's: 0.69 for 115 options of the Husky and 0.74 for 79
 /// of the Limo, in the plans of `a` to `d`.
 const PACE: f64 = 0.72;
+
+/// Seconds that leaving a tight place costs beside the way: stopping and starting.
+const DEPARTURE_S: f64 = 1.0;
+/// What is assumed of leaving a tight place before it is measured.
+const DEPARTURE_SUCCESS: f64 = 0.99;
 
 /// Prices options in a world under a noise.
 #[derive(Clone, Debug)]
@@ -33,6 +38,13 @@ pub(crate) struct Price {
     success: f64,
 }
 
+impl Price {
+    /// The chance to succeed.
+    pub(crate) const fn success(&self) -> f64 {
+        self.success
+    }
+}
+
 impl<'a> Pricer<'a> {
     pub(crate) fn new(
         world: &'a World,
@@ -44,8 +56,28 @@ impl<'a> Pricer<'a> {
         Self { world, noise: noise.clone(), settings, failure_cost_s, profile }
     }
 
+    /// The policy whose drives the model prices: the prior.
+    pub(crate) fn policy(&self) -> OptionPolicy {
+        let caution = Prior::caution(self.failure_cost_s);
+        self.world.prior().at(caution, &self.world.robot, &self.noise)
+    }
+
+    /// The price of `option`, and the `next` guide after it where that is known.
+    pub(crate) fn price(&self, option: &GuidedOption, next: Option<&GuidePath>) -> Price {
+        let Departure { back_off_m, careful_m } = option.departure;
+        if option.departure.is_none() {
+            return self.of_guide(option.id, &option.guide, next);
+        }
+        // The model knows the prior, which drives after that.
+        let rest = option.guide.from_arc(careful_m);
+        let Price { time_s, success } =
+            self.of_guide(option.id, rest.as_ref().unwrap_or(&option.guide), next);
+        let leaving_s = back_off_m / BACK_OFF_MPS + careful_m / CAREFUL_MPS + DEPARTURE_S;
+        Price { time_s: time_s + leaving_s, success: success * DEPARTURE_SUCCESS }
+    }
+
     /// The price of the leg called `id` with `guide`, and the `next` one after it where that is known.
-    pub(crate) fn price(&self, id: LegId, guide: &GuidePath, next: Option<&GuidePath>) -> Price {
+    pub(crate) fn of_guide(&self, id: LegId, guide: &GuidePath, next: Option<&GuidePath>) -> Price {
         let at = |time_s| Price { time_s, success: 1.0 };
         let price = match self.settings.price {
             PriceRule::Length => {
@@ -137,7 +169,7 @@ mod tests {
         for rule in [PriceRule::Length, PriceRule::Profile, PriceRule::Model] {
             let settings = SearchSettings { price: rule, ..SearchSettings::default() };
             let pricer = Pricer::new(&world, &NoiseModel::nominal(), settings, 1000.0);
-            let cost_s = pricer.cost_s(&pricer.price(option.id, &option.guide, None), None);
+            let cost_s = pricer.cost_s(&pricer.price(option, None), None);
             let at_top_s = option.guide.length_m() / world.robot.max_speed_mps;
             assert!((0.7 * at_top_s..6.0 * at_top_s + 10.0).contains(&cost_s), "{rule:?}: {cost_s} s");
         }

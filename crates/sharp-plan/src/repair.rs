@@ -154,8 +154,9 @@ fn relearn(
     }
     let gain = (GAIN_MIN * f64::from(episodes)).ceil() as u32;
     let beaten = SuccessCount { episodes, successes: (successes + gain).min(episodes) - 1 };
-    // Training is for options that are weak themselves, and once only.
-    let may_train = old.gradient_steps == 0 && on_arrival.rate() < learner.train_below();
+    // Training is for options that are weak themselves, and once only; how a tight start is left is not learnt.
+    let may_train =
+        old.gradient_steps == 0 && option.departure.is_none() && on_arrival.rate() < learner.train_below();
     let monitor = OptionMonitor { monitor: problem.monitor, option };
     let new = learner.improve(&task, beaten, may_train, &monitor).ok()??;
     let (env_steps, gradient_steps) =

@@ -6,20 +6,21 @@
 //! option that cannot be guided has lost its edge: the repair that downward refinability needs.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
-use sharp_drive::{SuccessEstimate, World};
+use sharp_drive::{Driver, InitialStates, SuccessEstimate, World};
 use sharp_guide::{
-    Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption, ridge_routes,
-    routes,
+    Departure, Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption,
+    departures, is_tight, ridge_routes, routes,
 };
 use sharp_options::OptionId;
 use sharp_rbvd::{StateAbstraction, StateId};
-use sharp_sim::NoiseModel;
+use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::{Cell, Point, Pose, Seed, trig};
 
 use crate::abstraction::Abstraction;
+use crate::conditions::Conditions;
 use crate::method::{Method, PriceRule, SearchSettings};
 use crate::option_graph::{Candidate, OptionGraph};
 use crate::price::{Price, Pricer};
@@ -32,6 +33,11 @@ const CAR_TURN_MAX_RAD: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
 /// A start or goal without a state of its own belongs to the nearest one within this distance, metres: a robot may
 /// stand where the diagram's margin has no state.
 const STATE_NEAR_M: f64 = 0.5;
+
+/// Episodes in which each way out of a tight start is tried.
+const TRIAL_EPISODES: u32 = 200;
+/// A leg from the start whose guide succeeds less often than this, by its price, looks for a better way to begin.
+const LEAVES_WELL: f64 = 0.98;
 
 /// The guided options of one problem and the searches among them.
 #[derive(Debug)]
@@ -47,6 +53,10 @@ pub struct Search<'a> {
     pricer: Pricer<'a>,
     /// What guided options cost before they are measured.
     prices: BTreeMap<LegId, Price>,
+    /// How the robot can leave its start, where that is a tight place; found when it is first asked for.
+    departures: OnceLock<Vec<(Departure, Vec<Pose>)>>,
+    /// Under what they are tried; by their prices alone without.
+    trials: Option<&'a Conditions>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
@@ -99,6 +109,8 @@ impl<'a> Search<'a> {
             guided: BTreeMap::new(),
             pricer: Pricer::new(world, noise, method.search, method.failure_cost_s),
             prices: BTreeMap::new(),
+            departures: OnceLock::new(),
+            trials: None,
             offers_direct: false,
             charges: BTreeMap::new(),
             seed,
@@ -149,7 +161,8 @@ impl<'a> Search<'a> {
     /// Notes the guide of the option called `id`, or that it has none.
     fn keep(&mut self, id: LegId, option: Result<Arc<GuidedOption>, NoGuide>) {
         if let Ok(option) = &option {
-            self.prices.insert(id, self.pricer.price(id, &option.guide, None));
+            let price = self.pricer.price(option, None);
+            self.prices.insert(id, price);
         }
         self.guided.insert(id, option);
     }
@@ -253,21 +266,88 @@ impl<'a> Search<'a> {
             let guide = guide_of_nothing(self.query.start, self.settings.guide.spacing_m);
             return guide.map(|guide| Arc::new(self.guided(candidate, guide)));
         }
-        if id == LegId::Direct && self.settings.direct {
-            let guide = self.direct_route(candidate.option.end).ok_or(NoGuide::Unreachable)?;
-            return Ok(Arc::new(self.guided(candidate, guide)));
+        if !matches!(id, LegId::First(_) | LegId::Direct) {
+            return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
         }
-        let mut rng = self.seed.stream(&format!("guide {id}"), 0);
-        let robot = self.world.guide_robot();
-        let guide = candidate.option.plan_guide(&self.space, &robot, self.guides, &mut rng)?;
-        Ok(Arc::new(self.guided(candidate, guide)))
+        let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
+        let is_tight = is_tight(&self.world.guide_robot(), self.query.start);
+        let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).success() >= LEAVES_WELL;
+        if !self.settings.departures || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
+            return at_once.map(Arc::new);
+        }
+        // A price knows little of tight places; elsewhere only what seems better than to drive at once is tried.
+        let priced_s = |option: &GuidedOption| self.pricer.cost_s(&self.pricer.price(option, None), None);
+        let at_once_s = at_once.as_ref().map_or(f64::INFINITY, priced_s);
+        let others = self.departures().iter().filter_map(|way| self.departing(candidate, way));
+        let mut ways: Vec<GuidedOption> =
+            others.filter(|option| is_tight || priced_s(option) < at_once_s).collect();
+        if ways.is_empty() {
+            return at_once.map(Arc::new);
+        }
+        ways.extend(at_once);
+        let options = ways.into_iter().map(Arc::new);
+        let tried = options.map(|option| (self.trial_cost_s(&option), option));
+        let (_, option) = tried.min_by(|a, b| a.0.total_cmp(&b.0)).expect("there is a way");
+        Ok(option)
+    }
+
+    /// What the leg `option` costs from the start, seconds: by a few episodes of the prior where there is a simulator, for
+    /// a price knows little of tight places.
+    fn trial_cost_s(&self, option: &Arc<GuidedOption>) -> f64 {
+        let price = self.pricer.price(option, None);
+        let measured = self.trials.map(|conditions| {
+            let policy = self.pricer.policy();
+            let states = InitialStates::exactly(RobotState::at_rest(self.query.start));
+            let seed = self.seed.child(&format!("leave {}", option.id), 0);
+            let trial = conditions.monte_carlo(self.world).with_episodes(TRIAL_EPISODES).with_seed(seed);
+            trial.estimate(&[Driver::new(option, &policy, None)], &states)
+        });
+        self.pricer.cost_s(&price, measured.as_ref())
+    }
+
+    /// From now on ways out of a tight start are tried under `conditions` before one is taken.
+    #[must_use]
+    pub(crate) fn with_trials(self, conditions: &'a Conditions) -> Self {
+        Self { trials: Some(conditions), ..self }
+    }
+
+    /// The ways out of the start, where it is a tight place.
+    fn departures(&self) -> &[(Departure, Vec<Pose>)] {
+        self.departures.get_or_init(|| {
+            let robot = &self.world.robot;
+            departures(&self.world.guide_robot(), self.query.start, robot.recovery_reverse_m)
+        })
+    }
+
+    /// The leg `candidate` with a guide that begins with `way`.
+    fn departing(&self, candidate: &Candidate, way: &(Departure, Vec<Pose>)) -> Option<GuidedOption> {
+        let (departure, lead) = way;
+        let rest = self.plan_from(candidate, *lead.last()?).ok()?;
+        let mut poses = lead.clone();
+        poses.extend(&rest.poses()[1..]);
+        let guide = GuidePath::new(poses, rest.spacing_m()).ok()?;
+        Some(self.guided(candidate, guide).with_departure(*departure))
+    }
+
+    /// A guide for the leg `candidate` for a robot at `start`.
+    fn plan_from(&self, candidate: &Candidate, start: Pose) -> Result<GuidePath, NoGuide> {
+        if candidate.id() == LegId::Direct && self.settings.direct {
+            return self.direct_route(start, candidate.option.end).ok_or(NoGuide::Unreachable);
+        }
+        let (start, heading) = (start.position, Some(start.heading));
+        self.plan_guide(&UnguidedOption { start, heading, ..candidate.option })
+    }
+
+    fn plan_guide(&self, option: &UnguidedOption) -> Result<GuidePath, NoGuide> {
+        let mut rng = self.seed.stream(&format!("guide {}", option.id), 0);
+        option.plan_guide(&self.space, &self.world.guide_robot(), self.guides, &mut rng)
     }
 
     /// The cheapest of the routes to `end` with different safety margins, by their prices.
-    fn direct_route(&self, end: Point) -> Option<GuidePath> {
-        let (robot, start) = (self.world.guide_robot(), self.query.start);
+    fn direct_route(&self, start: Pose, end: Point) -> Option<GuidePath> {
+        let robot = self.world.guide_robot();
         let price_s =
-            |guide: &GuidePath| self.pricer.cost_s(&self.pricer.price(LegId::Direct, guide, None), None);
+            |guide: &GuidePath| self.pricer.cost_s(&self.pricer.of_guide(LegId::Direct, guide, None), None);
         let cheapest = ridge_routes(&robot, start, end).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
         cheapest.or_else(|| routes(&robot, start, end, 0.5 * self.goal.radius_m).next())
     }

@@ -4,11 +4,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use sharp_drive::{Command, Controller, Decision, Motion, NetworkPolicy, PolicyInterface};
-use sharp_plan::{ComposedPolicy, Plan};
+use sharp_drive::{NetworkPolicy, PolicyInterface};
+use sharp_plan::{Instruction, Plan, Reading, RemoteDriver};
 use sharp_rl::{Actor, ActorScratch};
-use sharp_sim::{ActionSettings, RobotState};
-use sharp_space::Vector;
 
 use crate::error::Raised;
 use crate::map::{Triple, pose};
@@ -79,14 +77,7 @@ pub(crate) fn to_bytes<'py>(py: Python<'py>, numbers: &[f32]) -> Bound<'py, PyBy
 pub(crate) struct PyDriver {
     plan: Arc<Plan>,
     recovery: bool,
-    running: Mutex<Option<Running>>,
-}
-
-struct Running {
-    policy: ComposedPolicy,
-    state: RobotState,
-    /// The last answer, until its outcome is known.
-    pending: Option<Command>,
+    running: Mutex<Option<RemoteDriver>>,
 }
 
 /// Waypoint, speed, option and status.
@@ -103,54 +94,11 @@ impl PyDriver {
     /// What a robot at `at` does next. Speed and yaw rate that are not told come from the last two poses.
     fn act(&self, at: Triple, speed: Option<f64>, yaw_rate: Option<f64>) -> Answer {
         let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
-        let state = state(at, speed, yaw_rate, running.as_ref().map(|running| &running.state));
-        let running = running.get_or_insert_with(|| Running {
-            policy: ComposedPolicy::new(Arc::clone(&self.plan), state, self.recovery),
-            state,
-            pending: None,
-        });
-        running.answer(state)
-    }
-}
-
-/// The robot's state; motion that was not told is taken from the last two poses, one action apart.
-fn state(at: Triple, speed: Option<f64>, yaw_rate: Option<f64>, before: Option<&RobotState>) -> RobotState {
-    let pose = pose(at);
-    let mut state = RobotState::at_rest(pose);
-    let action_s = ActionSettings::default().action_s;
-    if let Some(before) = before {
-        state.velocity = before.pose.to_local(pose.position) / action_s;
-        state.yaw_rate_radps = before.pose.heading.turn_to(pose.heading) / action_s;
-        state.steer_rad = before.steer_rad;
-    }
-    if let Some(speed) = speed {
-        state.velocity = Vector::new(speed, 0.0);
-    }
-    state.yaw_rate_radps = yaw_rate.unwrap_or(state.yaw_rate_radps);
-    state
-}
-
-impl Running {
-    fn answer(&mut self, state: RobotState) -> Answer {
-        if let Some(command) = self.pending.take() {
-            self.policy.observe(&Motion::commanded(command, state));
-        }
-        self.state = state;
-        let decision = self.policy.decide();
-        let (command, status) = match decision {
-            Decision::Drive(command) if self.policy.is_recovering() => (Some(command), "recovering"),
-            Decision::Drive(command) => (Some(command), "running"),
-            // Nobody tells this robot of contacts, so it is never asked to back off.
-            Decision::BackOff => (None, "recovering"),
-            Decision::Reached => (None, "reached"),
-            Decision::Lost => (None, "lost"),
-        };
-        self.pending = command;
-        let waypoint = command.map(|command| {
-            let point = command.to_world(&state.pose);
-            (point.x, point.y)
-        });
-        let speed = command.map_or(0.0, |command| command.speed_mps);
-        (waypoint, speed, self.policy.option().id.to_string(), status)
+        let reading = Reading { pose: pose(at), speed_mps: speed, yaw_rate_radps: yaw_rate };
+        let begin = || RemoteDriver::new(vec![Arc::clone(&self.plan)], &reading, self.recovery);
+        let Instruction { waypoint, speed_mps, option, status } =
+            running.get_or_insert_with(begin).answer(&reading);
+        let waypoint = waypoint.map(|pose| (pose.position.x, pose.position.y));
+        (waypoint, speed_mps, option.to_string(), status.name())
     }
 }

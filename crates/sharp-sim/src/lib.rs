@@ -60,5 +60,5 @@ pub use rigid::RigidSim;
 pub use robot::{Drive, RobotError, RobotModel};
 pub use simulator::{ForkSimulator, Simulator, SimulatorKind, StepInfo, UnknownSimulator};
 pub use state::{RobotState, WheelCommand};
-pub use vehicle::{ActionReport, ActionSettings, Vehicle, VehicleSnapshot};
+pub use vehicle::{ActionReport, ActionSettings, BACK_OFF_MPS, Vehicle, VehicleSnapshot};
 pub use wheels::approach;

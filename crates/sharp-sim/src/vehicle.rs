@@ -16,7 +16,7 @@ use crate::simulator::Simulator;
 use crate::state::{RobotState, WheelCommand};
 
 /// Speed of backing off, metres per second: slow, because an obstacle is near.
-const BACK_OFF_MPS: f64 = 0.3;
+pub const BACK_OFF_MPS: f64 = 0.3;
 
 /// How an action is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -126,7 +126,7 @@ impl Controller for RrtController<'_> {
 
     fn decide(&mut self) -> Decision {
         if std::mem::take(&mut self.must_back_off) {
-            return Decision::BackOff;
+            return self.back_off();
         }
         if self.is_at_goal() {
             return Decision::Reached;
@@ -153,9 +153,13 @@ impl RrtController<'_> {
         (self.state.pose.position - query.goal.position).norm() < world.robot.goal_tolerance_m
     }
 
+    fn back_off(&self) -> Decision {
+        Decision::BackOff { distance_m: self.baseline.world.robot.recovery_reverse_m }
+    }
+
     /// Without a way on: the end, or where walls may be touched another step back.
     fn give_way(&self) -> Decision {
-        if self.baseline.contact_ends || self.plans == 0 { Decision::Lost } else { Decision::BackOff }
+        if self.baseline.contact_ends || self.plans == 0 { Decision::Lost } else { self.back_off() }
     }
 
     fn plan(&mut self, start: Pose) -> Readiness {

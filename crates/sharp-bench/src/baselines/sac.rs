@@ -113,7 +113,7 @@ impl Controller for SacController<'_> {
     fn decide(&mut self) -> Decision {
         let FlatSac { world, query, actor, .. } = self.baseline;
         if std::mem::take(&mut self.must_back_off) {
-            return Decision::BackOff;
+            return Decision::BackOff { distance_m: world.robot.recovery_reverse_m };
         }
         if is_at_goal(&world.robot, query, &self.pose) {
             return Decision::Reached;

@@ -204,7 +204,7 @@ impl Controller for Bull {
 
     fn decide(&mut self) -> Decision {
         if std::mem::take(&mut self.bumped) {
-            return Decision::BackOff;
+            return Decision::BackOff { distance_m: 0.4 };
         }
         Decision::Drive(Command { reach_m: 0.5, bearing_rad: 0.0, speed_mps: self.speed_mps })
     }
@@ -277,7 +277,7 @@ fn whoever_leaves_the_route_gets_a_new_one() {
         let after = RobotState::at_rest(Pose::new(x, y, 0.0));
         controller.observe(&Motion { contact, ..Motion::commanded(Command::default(), after) });
         if contact {
-            assert_eq!(controller.decide(), Decision::BackOff, "first away from the wall");
+            assert!(matches!(controller.decide(), Decision::BackOff { .. }), "first away from the wall");
         }
         controller.prepare()
     };

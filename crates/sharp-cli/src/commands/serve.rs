@@ -3,10 +3,8 @@
 use std::io::{BufRead, Write};
 
 use serde::{Deserialize, Serialize};
-use sharp_drive::{Command, Controller, Decision, Motion};
-use sharp_plan::{Plan, Tour, TourPolicy};
-use sharp_sim::{ActionSettings, RobotState};
-use sharp_space::{Occupancy, Pose, Vector, trig};
+use sharp_plan::{Instruction, Plan, Reading, RemoteDriver};
+use sharp_space::{Occupancy, Pose};
 
 use crate::args::Serve;
 use crate::commands::run::load_tour;
@@ -25,7 +23,7 @@ struct Request {
 #[derive(Serialize)]
 struct Reply<'a> {
     waypoint: Option<[f64; 3]>,
-    /// Speed at which the waypoint is to be approached, metres per second.
+    /// Speed at which the waypoint is to be approached, metres per second; negative for backwards.
     speed: f64,
     option: &'a str,
     status: &'static str,
@@ -34,7 +32,7 @@ struct Reply<'a> {
 pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
     let tour = load_tour(&args.plan_dir)?;
     let plan = &tour.plans[0];
-    let mut driver: Option<Served> = None;
+    let mut driver: Option<RemoteDriver> = None;
     let mut out = std::io::stdout().lock();
     for (index, line) in std::io::stdin().lock().lines().enumerate() {
         let line = line.map_err(|error| Failure::new("INPUT", format!("line {}: {error}", index + 1)))?;
@@ -43,9 +41,10 @@ pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
         }
         let reply = match parse(&line, index + 1) {
             Ok(request) => {
-                let state = state(&request, driver.as_ref().map(|served| &served.state));
-                if is_placed(plan, &state.pose) {
-                    driver.get_or_insert_with(|| Served::new(&tour, state)).answer(state)
+                let reading = reading(&request);
+                if is_placed(plan, &reading.pose) {
+                    let begin = || RemoteDriver::new(tour.plans.clone(), &reading, true);
+                    reply(&driver.get_or_insert_with(begin).answer(&reading))
                 } else {
                     // What it knew of the robot before stays, for the next pose may be a real one again.
                     to_json(&Reply { waypoint: None, speed: 0.0, option: "", status: "lost" })
@@ -77,59 +76,13 @@ fn is_placed(plan: &Plan, pose: &Pose) -> bool {
     grid.frame().cell_at(pose.position).is_some_and(|cell| grid.get(cell) == Occupancy::Free)
 }
 
-/// The robot's state; motion that was not told is taken from the last two poses, one action apart.
-fn state(request: &Request, before: Option<&RobotState>) -> RobotState {
-    let pose = Pose::from(request.pose);
-    let mut state = RobotState::at_rest(pose);
-    let action_s = ActionSettings::default().action_s;
-    if let Some(before) = before {
-        state.velocity = before.pose.to_local(pose.position) / action_s;
-        state.yaw_rate_radps = before.pose.heading.turn_to(pose.heading) / action_s;
-        state.steer_rad = before.steer_rad;
-    }
-    if let Some(speed) = request.speed {
-        state.velocity = Vector::new(speed, 0.0);
-    }
-    state.yaw_rate_radps = request.yaw_rate.unwrap_or(state.yaw_rate_radps);
-    state
+fn reading(request: &Request) -> Reading {
+    let Request { pose, speed, yaw_rate } = *request;
+    Reading { pose: Pose::from(pose), speed_mps: speed, yaw_rate_radps: yaw_rate }
 }
 
-/// A robot that is being driven.
-struct Served {
-    policy: TourPolicy,
-    state: RobotState,
-    /// The last answer, until its outcome is known.
-    pending: Option<Command>,
-}
-
-impl Served {
-    fn new(tour: &Tour, state: RobotState) -> Self {
-        Self { policy: TourPolicy::new(tour.plans.clone(), state, true), state, pending: None }
-    }
-
-    /// What to do for a robot that is now in `state`.
-    fn answer(&mut self, state: RobotState) -> String {
-        if let Some(command) = self.pending.take() {
-            self.policy.observe(&Motion::commanded(command, state));
-        }
-        self.state = state;
-        let decision = self.policy.decide();
-        let option = self.policy.option().id.to_string();
-        let (command, status) = match decision {
-            Decision::Drive(command) if self.policy.is_recovering() => (Some(command), "recovering"),
-            Decision::Drive(command) => (Some(command), "running"),
-            // Nobody tells this robot of contacts, so it is never asked to back off.
-            Decision::BackOff => (None, "recovering"),
-            Decision::Reached => (None, "reached"),
-            Decision::Lost => (None, "lost"),
-        };
-        self.pending = command;
-        let waypoint = command.map(|command| {
-            let point = command.to_world(&state.pose);
-            let towards = point - state.pose.position;
-            [point.x, point.y, trig::atan2(towards.y, towards.x)]
-        });
-        let speed = command.map_or(0.0, |command| command.speed_mps);
-        to_json(&Reply { waypoint, speed, option: &option, status })
-    }
+fn reply(instruction: &Instruction) -> String {
+    let Instruction { waypoint, speed_mps, option, status } = *instruction;
+    let waypoint = waypoint.map(|pose| [pose.position.x, pose.position.y, pose.heading.radians()]);
+    to_json(&Reply { waypoint, speed: speed_mps, option: &option.to_string(), status: status.name() })
 }

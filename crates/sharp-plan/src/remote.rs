@@ -1,0 +1,207 @@
+//! Driving a robot outside this program: poses in, waypoints out.
+
+use std::sync::Arc;
+
+use sharp_drive::{Command, Controller, Decision, Motion};
+use sharp_guide::LegId;
+use sharp_sim::{ActionSettings, BACK_OFF_MPS, RobotState};
+use sharp_space::{Heading, Pose, Vector, trig};
+
+use crate::plan_file::Plan;
+use crate::tour::TourPolicy;
+
+/// Backing off ends this much before its distance, metres: the robot rolls on.
+const BACKED_OFF_WITHIN_M: f64 = 0.02;
+/// Backing off is given up after so many times the actions that it should take: something is in the way.
+const PATIENCE: f64 = 3.0;
+
+/// What a robot outside tells of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Where it is.
+    pub pose: Pose,
+    /// Its forward speed, metres per second; taken from the last two poses where it is not told.
+    pub speed_mps: Option<f64>,
+    /// Its yaw rate, radians per second; taken likewise.
+    pub yaw_rate_radps: Option<f64>,
+}
+
+/// How a robot outside is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RemoteStatus {
+    /// It follows the plan.
+    Running,
+    /// It has a new plan, because the old one did not lead on.
+    Recovering,
+    /// It is at the goal.
+    Reached,
+    /// No way leads on.
+    Lost,
+}
+
+impl RemoteStatus {
+    /// Its name in answers.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Running => "running",
+            Self::Recovering => "recovering",
+            Self::Reached => "reached",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// What a robot outside has to do until its next pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instruction {
+    /// Where to drive; `None` for a stop.
+    pub waypoint: Option<Pose>,
+    /// How fast, metres per second; negative for backwards.
+    pub speed_mps: f64,
+    /// The option that runs.
+    pub option: LegId,
+    /// How it is doing.
+    pub status: RemoteStatus,
+}
+
+/// Drives a robot outside through plans, one answer for each pose.
+#[derive(Debug)]
+pub struct RemoteDriver {
+    policy: TourPolicy,
+    state: RobotState,
+    pending: Pending,
+}
+
+/// The last answer, until its outcome is known.
+#[derive(Clone, Copy, Debug)]
+enum Pending {
+    Nothing,
+    Command(Command),
+    BackOff { from: Pose, distance_m: f64, actions: u32 },
+}
+
+impl RemoteDriver {
+    /// Drives through `plans`, one after the other, from where the robot is now.
+    ///
+    /// # Panics
+    /// If there is no plan.
+    #[must_use]
+    pub fn new(plans: Vec<Arc<Plan>>, first: &Reading, recovery: bool) -> Self {
+        let state = state(first, None);
+        Self { policy: TourPolicy::new(plans, state, recovery), state, pending: Pending::Nothing }
+    }
+
+    /// What the robot has to do next; it was told to come back after one action.
+    pub fn answer(&mut self, reading: &Reading) -> Instruction {
+        let state = state(reading, Some(&self.state));
+        self.state = state;
+        match self.pending {
+            Pending::Nothing => {}
+            Pending::Command(command) => self.policy.observe(&Motion::commanded(command, state)),
+            Pending::BackOff { from, distance_m, actions } => {
+                let driven_m = from.distance_m(&state.pose);
+                let actions_max = PATIENCE * distance_m / (BACK_OFF_MPS * ActionSettings::default().action_s);
+                if driven_m < distance_m - BACKED_OFF_WITHIN_M && f64::from(actions) < actions_max {
+                    self.pending = Pending::BackOff { from, distance_m, actions: actions + 1 };
+                    return self.backwards(distance_m - driven_m);
+                }
+                self.policy
+                    .observe(&Motion { command: None, ..Motion::commanded(Command::default(), state) });
+            }
+        }
+        self.decide()
+    }
+
+    fn decide(&mut self) -> Instruction {
+        let state = self.state;
+        self.pending = Pending::Nothing;
+        match self.policy.decide() {
+            Decision::Drive(command) => {
+                self.pending = Pending::Command(command);
+                let point = command.to_world(&state.pose);
+                let towards = point - state.pose.position;
+                let heading = Heading::new(trig::atan2(towards.y, towards.x));
+                self.instruction(Some(Pose::at(point, heading)), command.speed_mps, self.status())
+            }
+            Decision::BackOff { distance_m } => {
+                self.pending = Pending::BackOff { from: state.pose, distance_m, actions: 1 };
+                self.backwards(distance_m)
+            }
+            Decision::Reached => self.instruction(None, 0.0, RemoteStatus::Reached),
+            Decision::Lost => self.instruction(None, 0.0, RemoteStatus::Lost),
+        }
+    }
+
+    const fn status(&self) -> RemoteStatus {
+        if self.policy.is_recovering() { RemoteStatus::Recovering } else { RemoteStatus::Running }
+    }
+
+    fn backwards(&self, left_m: f64) -> Instruction {
+        let pose = self.state.pose;
+        let behind = Pose::at(pose.to_world(Vector::new(-left_m, 0.0)), pose.heading);
+        self.instruction(Some(behind), -BACK_OFF_MPS, self.status())
+    }
+
+    fn instruction(&self, waypoint: Option<Pose>, speed_mps: f64, status: RemoteStatus) -> Instruction {
+        Instruction { waypoint, speed_mps, option: self.policy.option().id, status }
+    }
+}
+
+/// The robot's state; motion that was not told is taken from the last two poses, one action apart.
+fn state(reading: &Reading, before: Option<&RobotState>) -> RobotState {
+    let pose = reading.pose;
+    let mut state = RobotState::at_rest(pose);
+    let action_s = ActionSettings::default().action_s;
+    if let Some(before) = before {
+        state.velocity = before.pose.to_local(pose.position) / action_s;
+        state.yaw_rate_radps = before.pose.heading.turn_to(pose.heading) / action_s;
+        state.steer_rad = before.steer_rad;
+    }
+    if let Some(speed_mps) = reading.speed_mps {
+        state.velocity = Vector::new(speed_mps, 0.0);
+    }
+    state.yaw_rate_radps = reading.yaw_rate_radps.unwrap_or(state.yaw_rate_radps);
+    state
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_guide::Departure;
+    use sharp_options::OptionKind;
+
+    use super::*;
+    use crate::test_worlds::plan;
+
+    fn at(x: f64, y: f64) -> Reading {
+        Reading { pose: Pose::new(x, y, 0.0), speed_mps: None, yaw_rate_radps: None }
+    }
+
+    #[test]
+    fn a_plan_that_backs_off_first_is_told_so_until_it_has() {
+        let mut plan = (*plan(OptionKind::Centroid)).clone();
+        let first = &mut plan.solution.steps[0].option;
+        let departure = Departure { back_off_m: 0.3, careful_m: 0.0 };
+        *first = Arc::new((**first).clone().with_departure(departure));
+        let start = at(1.3, 2.2);
+        let mut driver = RemoteDriver::new(vec![Arc::new(plan)], &start, true);
+        let answers = [1.3, 1.15, 1.02, 1.0].map(|x| driver.answer(&at(x, 2.2)));
+        let speeds = answers.map(|answer| answer.speed_mps);
+        assert!(speeds[..2].iter().all(|&speed| speed == -BACK_OFF_MPS), "backwards: {speeds:?}");
+        assert!(speeds[2..].iter().all(|&speed| speed > 0.0), "then on: {speeds:?}");
+        let behind = answers[1].waypoint.expect("a place behind it");
+        assert!((behind.position.x - 1.0).abs() < 1e-9, "so much is left: {behind:?}");
+        assert!(answers.iter().all(|answer| answer.status == RemoteStatus::Running), "as planned");
+    }
+
+    #[test]
+    fn a_robot_that_cannot_back_off_is_not_asked_for_ever() {
+        let mut plan = (*plan(OptionKind::Centroid)).clone();
+        let first = &mut plan.solution.steps[0].option;
+        let departure = Departure { back_off_m: 0.3, careful_m: 0.0 };
+        *first = Arc::new((**first).clone().with_departure(departure));
+        let mut driver = RemoteDriver::new(vec![Arc::new(plan)], &at(1.3, 2.2), true);
+        let asked = (0..20).take_while(|_| driver.answer(&at(1.3, 2.2)).speed_mps < 0.0).count();
+        assert!((2..10).contains(&asked), "asked {asked} times");
+    }
+}
