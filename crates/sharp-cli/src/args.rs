@@ -36,7 +36,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Subcommands {
     /// Solve a path planning problem: regions, abstraction, search, learning, a policy on disk.
-    Solve(Solve),
+    Solve(Box<Solve>),
     /// Run a solved plan in a simulator and count how often it holds.
     Run(Run),
     /// Write a plan in a format that others read: tables, MCAP, route graphs, networks.

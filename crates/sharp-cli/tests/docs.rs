@@ -71,12 +71,17 @@ fn documents() -> Vec<PathBuf> {
     found
 }
 
+/// The search path with the program that is tested at its front.
+#[allow(clippy::disallowed_methods, reason = "shells find programs by the search path")]
+fn search_path() -> String {
+    let binaries = Path::new(env!("CARGO_BIN_EXE_sharp")).parent().expect("a folder");
+    format!("{}:{}", binaries.display(), std::env::var("PATH").unwrap_or_default())
+}
+
 /// Runs what `document` (from the root) says; the folder it ran in is left for a look if something fails.
 fn run(document: &str) {
     let (path, folder) = (root().join(document), tempfile::tempdir().expect("a folder"));
     let (mut ran, mut failures) = (0, Vec::new());
-    let binaries = Path::new(env!("CARGO_BIN_EXE_sharp")).parent().expect("a folder").to_owned();
-    let search = std::env::var("PATH").unwrap_or_default();
     for block in blocks(&path) {
         if let Some(file) = &block.file {
             fs::write(folder.path().join(file), &block.text).expect("a file");
@@ -102,7 +107,7 @@ fn run(document: &str) {
         let output = Command::new("bash")
             .args(["-euo", "pipefail", "-c", &block.text])
             .current_dir(folder.path())
-            .env("PATH", format!("{}:{search}", binaries.display()))
+            .env("PATH", search_path())
             .env("HOME", folder.path())
             .env("XDG_CACHE_HOME", folder.path().join("cache"))
             .output()

@@ -120,7 +120,8 @@ fn failures_are_told_with_their_place_and_leg() {
     assert_eq!((&weak[0]["leg"], &weak[0]["failed"]), (&0.into(), &true.into()));
     let end = recordings[0].moments.last().expect("a moment").state.pose.position;
     let place = &weak[0]["at"];
-    let off_m = (place[0].as_f64().unwrap() - end.x).hypot(place[1].as_f64().unwrap() - end.y);
+    let at = Point::new(place[0].as_f64().expect("x"), place[1].as_f64().expect("y"));
+    let off_m = (at - end).norm();
     assert!(off_m < 2.0, "{off_m} m from where the first drive ended");
     assert!(words[words.len() - 1].starts_with("Tightest place: "), "{words:?}");
     let counts = words.iter().filter(|words| words.contains("runs of the verification")).count();
