@@ -76,6 +76,7 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
             report.decision_us.p50,
             report.decision_us.p99
         );
+        say!("picture: {}", args.plan_dir.join("run.png").display());
     }
     Ok(Exit::Done)
 }
