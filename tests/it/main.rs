@@ -1,4 +1,6 @@
 //! One binary of integration tests: it links once.
+#[path = "../common/checker.rs"]
+mod checker;
 mod determinism;
 mod learning;
 mod library;
@@ -6,4 +8,5 @@ mod maps;
 mod paper;
 mod regions;
 mod robots;
+mod situations;
 mod worlds;

@@ -60,6 +60,17 @@ impl TestWorld {
         Self::new(grid, robot, &regions, kind)
     }
 
+    /// `grid` with one region, its roomiest cell.
+    pub(crate) fn with_one_region(grid: OccupancyGrid, robot: RobotModel, kind: OptionKind) -> Self {
+        let field = DistanceField::new(&grid);
+        let frame = *field.frame();
+        let roomiest = (0..frame.len())
+            .map(|index| frame.cell(index))
+            .max_by(|&a, &b| field.at(a).total_cmp(&field.at(b)));
+        let region = Region::new(RegionId(0), roomiest.into_iter().collect(), &field).expect("one cell");
+        Self::new(grid, robot, &[region], kind)
+    }
+
     /// A floor plan 15 m wide with cells of 0.1 m and the regions that geometry gives.
     pub(crate) fn generated(plan: FloorplanKind, robot: RobotModel, kind: OptionKind) -> Self {
         let grid = generate(plan, 15.0, 0.1, &mut Seed(11).stream("map", plan as u64));

@@ -17,6 +17,7 @@ mod peers_learning;
 mod peers_option;
 mod peers_regions;
 mod process;
+mod soak;
 mod stats;
 mod tidy;
 mod train_prior;
@@ -33,6 +34,7 @@ usage: cargo xtask COMMAND
   ci [STEPS]             everything that must pass: format, tidy, packages, clippy, docs, tests,
                          examples, downstream; or only the steps named
   tidy                   house rules that no compiler checks
+  soak [NAMES]           tests/soak with many cases: hours; or only the tests that a name is part of
   stats                  a table of lines, functions and docs of each crate
   train-regions [ARGS]   sharp regions train ARGS, on the ndarray device by default
   train-prior [ARGS]     sharp prior train ARGS, for both robots by default
@@ -54,6 +56,7 @@ fn main() -> ExitCode {
     let outcome = match command {
         "ci" => ci::run(rest),
         "tidy" => tidy::run(),
+        "soak" => soak::run(rest),
         "stats" => Tree::load().map(|tree| {
             print!("{}", stats::table(&tree));
             0

@@ -3,7 +3,9 @@
 //! The clearance search plans a route and checks outline and bends; where it cannot, hybrid A* searches. Both try the
 //! robot with the largest safety margin first.
 
-use sharp_motion::{HybridSettings, MotionQuery, Path, Steering, hybrid_astar};
+use std::cell::OnceCell;
+
+use sharp_motion::{Budget, HybridSettings, MotionQuery, Path, Steering, hybrid_astar};
 use sharp_space::{Heading, Point, Pose, Seed};
 
 use crate::inflate::GuideRobot;
@@ -13,16 +15,23 @@ use crate::request::{GuideEnd, GuideRequest};
 use crate::settings::GuideSettings;
 
 /// A route from `start` to within `goal_radius_m` of `goal` for each safety margin for which there is one, the largest
-/// margin first. Each is planned when it is asked for.
+/// margin first. Each is planned when it is asked for; a search gives up after so many `expansions`.
 pub fn routes<'a>(
     robot: &GuideRobot<'a>,
     start: Pose,
-    goal: Point,
-    goal_radius_m: f64,
+    (goal, goal_radius_m): (Point, f64),
+    expansions: usize,
 ) -> impl Iterator<Item = GuidePath> + use<'a> {
-    let robots = robot.inflated_at(Some(start));
-    robots.filter_map(move |robot| {
-        ridge(&robot, start, goal).or_else(|| searched(&robot, start, goal, goal_radius_m))
+    let budget = Budget { iterations: expansions };
+    let settings = HybridSettings { budget, goal_radius_m, ..HybridSettings::default() };
+    let without_margin = GuideRobot::new(robot.geometry, robot.steering);
+    // Where the robot itself finds no way, one with a margin need not search.
+    let has_way = OnceCell::new();
+    robot.inflated_at(Some(start)).filter_map(move |robot| {
+        ridge(&robot, start, goal).or_else(|| {
+            let has_way = has_way.get_or_init(|| searched(&without_margin, start, goal, &settings).is_some());
+            has_way.then(|| searched(&robot, start, goal, &settings)).flatten()
+        })
     })
 }
 
@@ -49,10 +58,14 @@ fn ridge(robot: &GuideRobot<'_>, start: Pose, goal: Point) -> Option<GuidePath> 
 }
 
 /// By hybrid A*.
-fn searched(robot: &GuideRobot<'_>, start: Pose, goal: Point, goal_radius_m: f64) -> Option<GuidePath> {
-    let settings = HybridSettings { goal_radius_m, ..HybridSettings::default() };
+fn searched(
+    robot: &GuideRobot<'_>,
+    start: Pose,
+    goal: Point,
+    settings: &HybridSettings,
+) -> Option<GuidePath> {
     let query = MotionQuery { start, goal: Pose::at(goal, start.heading) };
-    let path = hybrid_astar(&query, robot.geometry, &robot.steering, &settings).path()?;
+    let path = hybrid_astar(&query, robot.geometry, &robot.steering, settings).path()?;
     as_guide(&path, &robot.steering)
 }
 

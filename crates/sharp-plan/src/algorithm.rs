@@ -17,7 +17,7 @@ use crate::library::OptionLibrary;
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Phase;
-use crate::reason::obstruction;
+use crate::reason::{is_joined, obstruction};
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
 use crate::verify::{PlannedOption, Solution, verify};
@@ -71,7 +71,8 @@ fn algorithm_1(
     for _ in 0..ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
         let Some((_, p)) = cheapest(problem, &mut search, &policies) else {
-            if search.offer_direct() {
+            // Where the map joins start and goal, a motion planner may know a way that no options know.
+            if is_joined(world, &query) && search.offer_direct() {
                 continue;
             }
             break;

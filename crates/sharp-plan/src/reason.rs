@@ -39,6 +39,11 @@ pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
     })
 }
 
+/// Returns true if some free way joins start and goal, however narrow.
+pub(crate) fn is_joined(world: &World, query: &Query) -> bool {
+    narrowest_place(world, query).is_some()
+}
+
 /// A cell with the least clearance on the way to it; the one with the most comes first.
 #[derive(PartialEq)]
 struct Reached {

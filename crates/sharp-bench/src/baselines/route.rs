@@ -4,6 +4,9 @@ use sharp_drive::World;
 use sharp_guide::{GuidePath, GuideRobot, routes};
 use sharp_space::Pose;
 
+/// Poses that a search for a route expands before it gives up; no indoor map has as many.
+const EXPANSIONS: usize = 2_000_000;
+
 /// Plans routes to one goal for one robot in one map.
 #[derive(Clone, Debug)]
 pub struct RoutePlanner<'a> {
@@ -22,7 +25,7 @@ impl<'a> RoutePlanner<'a> {
     #[must_use]
     pub fn plan_from(&self, start: Pose) -> Option<GuidePath> {
         let goal_radius_m = 0.5 * self.world.robot.goal_tolerance_m;
-        routes(&self.world.guide_robot(), start, self.goal.position, goal_radius_m).next()
+        routes(&self.world.guide_robot(), start, (self.goal.position, goal_radius_m), EXPANSIONS).next()
     }
 
     /// The robot with the safety margins that it has room for at `start`, the largest first.

@@ -1,0 +1,105 @@
+//! Group 15: every guide of every plan, looked at four times as finely as the planner looks, by a checker of its own.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use rayon::prelude::*;
+use sharp_guide::{GuidedOption, join_guides};
+use sharp_options::OptionKind;
+use sharp_plan::{Method, Search};
+use sharp_sim::{NoiseModel, RobotModel};
+use sharp_space::{OccupancyGrid, Pose, Seed};
+
+use crate::checker::{Outline, deepest_m};
+use crate::worlds::{abstraction, building, query, robot};
+use crate::{cases, told};
+
+/// Distance between two looks, metres: a quarter of the planner's.
+const LOOK_M: f64 = 0.0125;
+/// Between two looks of the planner a corner may cut a corner by this much, metres.
+const ALLOWED_M: f64 = 0.002;
+/// Plans that are tried in each building.
+const QUERIES: u64 = 10;
+
+/// What is wrong with the guides of a plan.
+fn fault(
+    grid: &OccupancyGrid,
+    robot: &RobotModel,
+    outline: &Outline,
+    plan: &[std::sync::Arc<GuidedOption>],
+) -> Option<String> {
+    for option in plan {
+        let poses = option.guide.poses();
+        for (index, pair) in poses.windows(2).enumerate() {
+            let (length_m, turn) = (pair[0].distance_m(&pair[1]), pair[0].heading.turn_to(pair[1].heading));
+            if length_m >= option.guide.spacing_m() {
+                return Some(format!("{}: a gap of {length_m} m", option.id));
+            }
+            let radius_m = robot.min_turning_radius_m();
+            if turn.abs() * radius_m > 1.101 * length_m {
+                return Some(format!(
+                    "{}: a bend of {} m at {:?}, the robot needs {radius_m} m",
+                    option.id,
+                    length_m / turn.abs(),
+                    pair[0]
+                ));
+            }
+            let steps = (length_m / LOOK_M).ceil().max(1.0);
+            for i in 0..=steps as usize {
+                let share = i as f64 / steps;
+                let position = pair[0].position + (pair[1].position - pair[0].position) * share;
+                let pose = Pose::at(position, (pair[0].heading.radians() + turn * share).into());
+                let overlap_m = deepest_m(grid, outline, pose);
+                if overlap_m > ALLOWED_M {
+                    return Some(format!(
+                        "{}: {overlap_m} m inside an obstacle after pose {index}, at {pose:?}",
+                        option.id
+                    ));
+                }
+            }
+        }
+    }
+    None
+}
+
+#[test]
+fn no_plan_leads_through_an_obstacle_or_round_a_bend_that_is_too_tight() {
+    let since = Instant::now();
+    let wanted = cases(100, 1_000_000);
+    let (tried, planned) = (AtomicU64::new(0), AtomicU64::new(0));
+    let faults: Vec<String> = (0..wanted.div_ceil(QUERIES))
+        .into_par_iter()
+        .flat_map_iter(|number| {
+            let mut rng = Seed(18).stream("soak plans", number);
+            let grid = building(&mut rng);
+            let (robot, outline) = robot(&mut rng);
+            let kind = [OptionKind::Centroid, OptionKind::Interface][(number % 2) as usize];
+            let mut faults = Vec::new();
+            let Some((world, abstraction)) = abstraction(&grid, robot.clone(), kind) else { return faults };
+            let (method, noise) = (Method::fast(), NoiseModel::nominal());
+            for _ in 0..QUERIES {
+                let Some(query) = query(&world, &mut rng) else { break };
+                tried.fetch_add(1, Ordering::Relaxed);
+                let search = Search::new(&world, &abstraction, &method, &noise, query, [], Seed(number));
+                let Some((_, plan)) = search.ok().and_then(|mut search| search.plan(&|_| None, &())) else {
+                    continue;
+                };
+                planned.fetch_add(1, Ordering::Relaxed);
+                let joined = join_guides(plan, query.start, &world.guide_robot(), &method.search.guide);
+                if let Some(fault) = fault(&grid, &robot, &outline, &joined) {
+                    faults.push(format!("building {number}, {query:?}: {fault}"));
+                }
+            }
+            faults
+        })
+        .collect();
+    let (tried, planned) = (tried.into_inner(), planned.into_inner());
+    told(
+        "guides keep clear of obstacles",
+        planned,
+        &format!("{} faults, {} without a plan", faults.len(), tried - planned),
+        since,
+    );
+    assert!(faults.is_empty(), "{} of {planned}: {:#?}", faults.len(), &faults[..faults.len().min(10)]);
+    assert!(2 * planned > tried, "too few have a plan: {planned} of {tried}");
+}
