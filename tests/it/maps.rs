@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use sharp_maps::{LoadOptions, MapError, MapFile, load, save_ros};
+use sharp_maps::{LoadOptions, MapError, MapFile, load, load_values, save_ros};
 use sharp_space::{Cell, GridFrame, Occupancy, OccupancyGrid, Pose};
 use tempfile::TempDir;
 
@@ -405,6 +405,26 @@ fn a_threshold_that_takes_unknown_cells_for_free_is_warned_about() {
     };
     assert!(load("0.25").iter().any(|warning| warning.contains("free_thresh 0.25")), "205 is 0.196 of black");
     assert!(load("0.195").is_empty(), "205 stays unknown");
+}
+
+#[test]
+fn the_values_of_a_mask_are_those_that_nav2_publishes() {
+    let values = |row: [u8; 3], mode: &str| {
+        let folder = sound_map();
+        let yaml = folder.path().join("map.yaml");
+        let text = SOUND_YAML.replace("0.65", "1.0").replace("0.196", "0.0") + &format!("mode: {mode}\n");
+        fs::write(&yaml, text).expect("written");
+        let pgm = [&b"P5\n3 2\n255\n"[..], &row, &[255, 255, 0]].concat();
+        fs::write(folder.path().join("map.pgm"), pgm).expect("written");
+        let mask = load_values(&yaml, &LoadOptions::default()).expect("a mask");
+        assert_eq!((mask.frame.width, mask.frame.height, mask.frame.resolution_m), (3, 2, 0.5));
+        assert_eq!(mask.frame.origin, Pose::new(1.0, 2.0, 0.0));
+        // The lower row comes first.
+        mask.values[3..].to_vec()
+    };
+    assert_eq!(values([178, 127, 0], "scale"), [30, 50, 100]);
+    assert_eq!(values([30, 100, 101], "raw"), [30, 100, -1]);
+    assert_eq!(values([255, 127, 0], "trinary"), [0, -1, 100]);
 }
 
 #[test]

@@ -33,6 +33,7 @@ pub mod pictures;
 mod baselines;
 mod contender;
 mod curves;
+mod data_uri;
 mod error;
 mod evaluation;
 mod jobs;
@@ -42,11 +43,16 @@ mod prior;
 mod reports;
 mod result;
 mod robot_import;
+mod show;
 mod solve;
+mod speed_mask;
 mod stopwatch;
 mod tensorboard;
 mod times;
 mod tour;
+
+#[cfg(test)]
+mod tests;
 
 pub use baselines::{FlatSac, Mpc, RoutePlanner, Rrt, SacBudget, Track};
 pub use contender::{ComparisonSettings, Composed, Contender, Driven, compare};
@@ -74,7 +80,9 @@ pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
 };
 pub use robot_import::{ImportError, ImportWishes, ImportedField, ImportedRobot, import_robot};
+pub use show::PlanPage;
 pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
+pub use speed_mask::{SpeedMaskError, SpeedRule, speed_limits};
 pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
 pub use tensorboard::EventFile;
 pub use times::{DecisionTimes, Reuse, SolveTimes};

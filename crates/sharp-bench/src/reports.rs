@@ -90,6 +90,12 @@ pub struct OptionReport {
 }
 
 impl OptionReport {
+    /// The options of `plan` in order.
+    pub(crate) fn all(plan: &Plan) -> Vec<Self> {
+        let steps = plan.solution.steps.iter().zip(plan.prices_s());
+        steps.map(|(step, price_s)| Self::new(step, price_s, plan)).collect()
+    }
+
     fn new(planned: &PlannedOption, price_s: f64, plan: &Plan) -> Self {
         let PlannedOption { option, learnt, reused, on_arrival, arrival_time_s } = planned;
         Self {
@@ -193,11 +199,9 @@ impl SolveReport {
     pub(crate) fn with_plan(self, plan: &Plan) -> Self {
         let solution = &plan.solution;
         let (uses, reused) = solution.reuse();
-        let steps = solution.steps.iter().zip(plan.prices_s());
-        let report = |(step, price_s)| OptionReport::new(step, price_s, plan);
         Self {
             status: "solved",
-            plan: steps.map(report).collect(),
+            plan: OptionReport::all(plan),
             reuse: Reuse { uses, reused },
             predicted: Some(Predicted {
                 basis: "runs",

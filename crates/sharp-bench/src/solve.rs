@@ -191,6 +191,12 @@ impl Solved {
         Ok(())
     }
 
+    /// The options learnt so far.
+    #[must_use]
+    pub const fn library(&self) -> &OptionLibrary {
+        self.sharp.library()
+    }
+
     /// Writes what was learnt into the library.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use sharp_bench::{AbstractionRequest, BaselineKind, BaselineSettings};
 use sharp_options::OptionKind;
 use sharp_rbvd::CellMetric;
 
-pub(crate) use problem::ProblemArgs;
+pub(crate) use problem::{ProblemArgs, SpeedArgs};
 pub(crate) use robots::{DriveName, Robots};
 pub(crate) use suites::{EngineName, Eval, Jobs, Submit, SuiteArgs};
 
@@ -36,7 +36,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Subcommands {
     /// Solve a path planning problem: regions, abstraction, search, learning, a policy on disk.
-    Solve(Solve),
+    Solve(Box<Solve>),
     /// Run a solved plan in a simulator and count how often it holds.
     Run(Run),
     /// Write a plan in a format that others read: tables, MCAP, route graphs, networks.
@@ -71,6 +71,12 @@ pub(crate) enum Subcommands {
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
+    },
+    /// Print the manual page, or write one for each command.
+    Man {
+        /// Write the pages of all commands there, as into ~/.local/share/man/man1 [default: print the first one].
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
     },
 }
 
@@ -179,6 +185,8 @@ pub(crate) struct Solve {
     pub(crate) abstraction: AbstractionArgs,
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
+    #[command(flatten)]
+    pub(crate) speed: SpeedArgs,
     /// Drive there first, before the goal; may be repeated, in this order.
     #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true)]
     pub(crate) via: Vec<String>,
@@ -188,6 +196,9 @@ pub(crate) struct Solve {
     /// How policies are learnt.
     #[arg(long, value_enum, default_value_t = Learning::Fast)]
     pub(crate) learning: Learning,
+    /// The prior that options begin with, a file of `sharp prior train` [default: the shipped one of the robot's kind].
+    #[arg(long, value_name = "FILE")]
+    pub(crate) prior: Option<PathBuf>,
     /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
@@ -216,6 +227,10 @@ pub(crate) struct Solve {
     /// Stop after so many seconds of wall time, with the best plan so far; what was learnt is kept.
     #[arg(long, value_name = "S")]
     pub(crate) time_limit: Option<f64>,
+    /// Drive the plan and write a page to look at: map, options, drives that move, weak places [default file: show.html
+    /// in the plan's folder].
+    #[arg(long, value_name = "FILE.html", num_args = 0..=1, value_parser = page_file)]
+    pub(crate) show: Option<Option<PathBuf>>,
     /// Write learning curves for TensorBoard there, one run a leg that is trained [default: none].
     #[arg(long, value_name = "DIR")]
     pub(crate) tensorboard: Option<PathBuf>,
@@ -250,6 +265,18 @@ pub(crate) struct Run {
     /// Write all episodes there, one after the other, as ROS 2 messages in an MCAP file, for Foxglove and others.
     #[arg(long, value_name = "FILE.mcap")]
     pub(crate) record: Option<PathBuf>,
+    /// Write a page of the executions to look at, as `sharp solve --show` does [default file: show.html in the plan's
+    /// folder].
+    #[arg(long, value_name = "FILE.html", num_args = 0..=1, value_parser = page_file)]
+    pub(crate) show: Option<Option<PathBuf>>,
+}
+
+/// The name of a page. What follows `--show` may be the next argument of the command instead, which this tells apart.
+fn page_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+    let expected = "expected a file that ends in .html; without a file, put --show last";
+    is_page.then_some(path).ok_or_else(|| expected.to_owned())
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use sharp_maps::{LoadOptions, MapFile, load, load_scenario};
+use sharp_bench::SpeedRule;
+use sharp_drive::SpeedLimits;
+use sharp_maps::{LoadOptions, MapFile, load, load_scenario, load_values};
 use sharp_plan::Query;
 use sharp_sim::{SimulatorKind, UnknownSimulator};
 use sharp_space::{Point, Pose, trig};
 
-use crate::args::{MapArgs, ProblemArgs, Unknown};
+use crate::args::{MapArgs, ProblemArgs, SpeedArgs, Unknown};
 use crate::outcome::Failure;
 
 /// Maps of more cells are warned about: 4000 x 4000.
@@ -47,6 +49,25 @@ pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
         eprintln!("warning: {warning}");
     }
     Ok(map)
+}
+
+/// The speed limits that `args` ask for, for a robot with a top speed of `max_speed_mps`.
+pub(crate) fn speed_limits(
+    args: &SpeedArgs,
+    map: &MapArgs,
+    max_speed_mps: f64,
+) -> Result<Option<SpeedLimits>, Failure> {
+    let Some(path) = &args.speed_mask else { return Ok(None) };
+    let options = LoadOptions { allow_outside: map.allow_outside, ..LoadOptions::default() };
+    let mask = load_values(path, &options)?;
+    for warning in &mask.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let (base, multiplier) = (args.speed_base, args.speed_multiplier);
+    let rule = SpeedRule { base, multiplier, is_absolute: args.speed_absolute };
+    let limits = sharp_bench::speed_limits(&mask, rule, max_speed_mps);
+    let refused = |error| Failure::new("MAP_FIELD", format!("--speed-mask {}: {error}", path.display()));
+    limits.map(Some).map_err(refused)
 }
 
 /// The simulator called `name`.
@@ -107,8 +128,8 @@ fn cache_folder() -> PathBuf {
         .join("sharp")
 }
 
-/// Refuses a `folder` that could not be made or written, before the work for it is done; leaves nothing behind.
-pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
+/// Refuses a `folder` of `flag` that could not be made or written, before the work for it is done; leaves nothing behind.
+pub(crate) fn check_out(flag: &str, folder: &Path) -> Result<(), Failure> {
     let mut there = folder;
     while !there.exists() {
         match there.parent().filter(|parent| !parent.as_os_str().is_empty()) {
@@ -117,8 +138,11 @@ pub(crate) fn check_out(folder: &Path) -> Result<(), Failure> {
         }
     }
     tempfile::tempfile_in(there).map(drop).map_err(|error| {
-        let message =
-            format!("--out is {}, but in {} no file can be made: {error}", folder.display(), there.display());
+        let message = format!(
+            "{flag} is {}, but in {} no file can be made: {error}",
+            folder.display(),
+            there.display()
+        );
         Failure::new("FILE_INVALID", message)
     })
 }
@@ -144,7 +168,14 @@ pub(crate) fn query(map: &MapFile, args: &ProblemArgs) -> Result<Query, Failure>
     match (start, goal) {
         (Some((start, true)), Some(goal)) => Ok(Query { start, goal }),
         (Some((start, false)), Some(goal)) => Ok(towards(start.position, goal.position)),
-        _ => Err(Failure::new("USAGE", "either --start and --goal or --problem is needed")),
+        _ => {
+            let bounds = map.grid.frame().bounds();
+            let [low, high] = [bounds.min, bounds.max].map(|at| format!("({:.1}, {:.1})", at.x, at.y));
+            let message = format!(
+                "either --start X,Y,YAW and --goal X,Y or --problem is needed; the map reaches from {low} to {high}"
+            );
+            Err(Failure::new("USAGE", message))
+        }
     }
 }
 
@@ -232,10 +263,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("file");
         fs::write(&file, "").expect("a file");
-        let message = check_out(&file.join("plan")).unwrap_err().to_string();
+        let message = check_out("--out", &file.join("plan")).unwrap_err().to_string();
         assert!(message.contains("--out") && message.contains("file/plan"), "{message}");
         let new = folder.path().join("some/where");
-        check_out(&new).expect("can be made");
+        check_out("--out", &new).expect("can be made");
         assert!(!folder.path().join("some").exists(), "asking makes nothing");
     }
 }

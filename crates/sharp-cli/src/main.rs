@@ -56,5 +56,6 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
             clap_complete::generate(*shell, &mut Cli::command(), "sharp", &mut std::io::stdout());
             Ok(Exit::Done)
         }
+        Subcommands::Man { out } => commands::man::run(Cli::command(), out.as_deref(), cli.json),
     }
 }

@@ -165,6 +165,68 @@ fn a_solved_plan_runs_serves_and_repeats_byte_for_byte() {
     assert_eq!(first, second, "two processes that bump into walls");
 }
 
+#[test]
+fn a_page_to_look_at_is_written_where_it_is_wanted() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let data = |file: &str| -> Value {
+        let page = fs::read_to_string(folder.path().join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
+        let data = page.split("id=\"data\">").nth(1).unwrap().split("</script>").next().unwrap();
+        serde_json::from_str(data).unwrap()
+    };
+    let report = json(&solve_rooms(folder.path(), &["--library", "none", "--out", "one", "--show"]));
+    let shown = data("one/show.html");
+    assert_eq!((&shown["map"]["name"], &shown["runs"]["episodes"]), (&"rooms".into(), &200.into()));
+    let legs = |value: &Value| -> Vec<Value> {
+        value.as_array().unwrap().iter().map(|leg| leg["option"].clone()).collect()
+    };
+    assert_eq!(legs(&shown["legs"]), legs(&report["plan"]), "the plan that was found");
+    assert_eq!(shown["predicted"]["success"], report["predicted"]["success"]);
+    let run = sharp(folder.path(), &["--json", "run", "one", "--episodes", "3", "--show", "three.html"]);
+    let (run, shown) = (json(&run), data("three.html"));
+    assert_eq!((&shown["runs"]["episodes"], &shown["runs"]["reached"]), (&3.into(), &run["successes"]));
+    assert_eq!(shown["map"]["name"], "rooms");
+    for args in [&["run", "--show", "one"][..], &["run", "one", "--show", "page.txt"]] {
+        let output = sharp(folder.path(), args);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(said.contains("--show") && said.contains("ends in .html"), "{args:?}: {said}");
+    }
+}
+
+#[test]
+fn completions_and_manual_pages_know_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |args: &[&str]| {
+        let output = sharp(folder.path(), args);
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let help = text(&["--help"]);
+    let listed = help.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
+    let names: Vec<&str> = listed
+        .lines()
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|&name| name != "help")
+        .collect();
+    assert!(names.len() >= 15 && names.contains(&"solve") && names.contains(&"man"), "{names:?}");
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = text(&["completions", shell]);
+        let missing: Vec<_> = names.iter().filter(|name| !script.contains(**name)).collect();
+        assert!(missing.is_empty(), "{shell} does not know {missing:?}");
+    }
+    let pages: Value = serde_json::from_str(&text(&["--json", "man", "--out", "man"])).unwrap();
+    let pages: Vec<&str> = pages["pages"].as_array().unwrap().iter().map(|it| it.as_str().unwrap()).collect();
+    for name in names {
+        assert!(pages.contains(&&*format!("sharp-{name}.1")), "{name} has no page among {pages:?}");
+    }
+    assert!(pages.contains(&"sharp-map-save.1"), "commands below commands have pages: {pages:?}");
+    let page = fs::read_to_string(folder.path().join("man/sharp-solve.1")).unwrap();
+    assert!(page.contains(".TH sharp-solve 1") && page.contains("speed\\-mask"), "{page}");
+    assert!(text(&["man"]).contains(".TH sharp 1"), "the first page, on standard output");
+}
+
 /// A report of `sharp run` without its wall times.
 fn untimed(mut report: Value) -> Value {
     report.as_object_mut().unwrap().remove("decision_us").expect("wall times are reported");

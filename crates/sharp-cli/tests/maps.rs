@@ -131,3 +131,40 @@ fn goals_in_a_row_are_solved_run_and_served_as_one() {
         assert!(folder.path().join("q/tour.ron").exists(), "the plan is written all the same");
     }
 }
+
+/// A speed mask for the hall: all of it has the value 75.
+fn write_speed_mask(folder: &Path) {
+    let header = b"P5\n12 6\n255\n".to_vec();
+    fs::write(folder.join("slow.pgm"), [header, vec![75; 72]].concat()).expect("a file");
+    let yaml = "image: slow.pgm\nresolution: 1.0\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n\
+                free_thresh: 0.196\nmode: raw\n";
+    fs::write(folder.join("slow.yaml"), yaml).expect("a file");
+}
+
+#[test]
+fn a_speed_mask_holds_in_the_prediction_and_in_the_drives() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_hall(folder.path(), "hall", 0..0);
+    write_speed_mask(folder.path());
+    let args = ["--json", "solve", "hall.yaml", "--start", "1,5,0", "--goal", "9,5", "--noise", "none"];
+    let solve = |extra: &[&str]| json(&sharp(folder.path(), &[&args[..], &QUICK, extra].concat()));
+    let free = solve(&["--out", "free"]);
+    let slow = solve(&["--out", "slow", "--speed-mask", "slow.yaml"]);
+    let time_s = |report: &Value| report["predicted"]["sim_time_s"].as_f64().expect("a time");
+    // A quarter of the Husky's top speed of 1 m/s along 8 m, less the tolerance at the goal.
+    assert!(time_s(&free) < 16.0 && (29.0..36.0).contains(&time_s(&slow)), "{free}\n{slow}");
+    assert!(slow["plan"][0]["price_s"].as_f64() > Some(25.0), "the search knows: {slow}");
+    let run = json(&sharp(folder.path(), &["--json", "run", "slow", "--episodes", "3"]));
+    assert_eq!(run["successes"], 3, "{run}");
+    let driven_s = run["mean_sim_time_s"].as_f64().expect("a time");
+    assert!((driven_s - time_s(&slow)).abs() < 2.0, "the plan keeps the mask: {run}");
+    let half = ["--out", "half", "--speed-mask", "slow.yaml", "--speed-absolute"];
+    let half = solve(&[&half[..], &["--speed-base", "0", "--speed-multiplier", "0.0066667"]].concat());
+    assert!((14.0..19.0).contains(&time_s(&half)), "half a metre per second: {half}");
+    let refused = ["--speed-mask", "slow.yaml", "--speed-multiplier", "-2", "--out", "x"];
+    let refused = solve(&refused)["error"]["message"].to_string();
+    assert!(
+        refused.contains("--speed-mask slow.yaml: the value 75 at") && refused.contains("means -50 %"),
+        "{refused}"
+    );
+}

@@ -25,6 +25,11 @@ impl Color {
         let [_, red, green, blue] = rgb.to_be_bytes();
         Self([red, green, blue])
     }
+
+    /// Red, green and blue.
+    pub(crate) const fn rgb(self) -> [u8; 3] {
+        self.0
+    }
 }
 
 impl fmt::Display for Color {

@@ -63,6 +63,8 @@ pub struct Automaton {
     observation: Observation,
     progress: GuideProgress,
     actions: u32,
+    /// How many of the actions do not count, because a speed limit made them short.
+    spared: f64,
 }
 
 impl Automaton {
@@ -74,7 +76,7 @@ impl Automaton {
     pub fn new(links: Arc<[Link]>, observation: Observation) -> Self {
         assert!(!links.is_empty(), "a chain has options");
         let progress = GuideProgress::default();
-        let mut this = Self { links, visits: Vec::new(), observation, progress, actions: 0 };
+        let mut this = Self { links, visits: Vec::new(), observation, progress, actions: 0, spared: 0.0 };
         this.enter();
         this
     }
@@ -152,6 +154,9 @@ impl Automaton {
         }
         self.visits[index].time_s += motion.time_s;
         self.actions += 1;
+        if let Some(limits) = &world.speed_limits {
+            self.spared += 1.0 - limits.counts(motion.after.pose.position);
+        }
     }
 
     /// What the robot has to do before a policy may drive: leave the tight place in which the plan begins. `None` as
@@ -169,13 +174,14 @@ impl Automaton {
     /// Returns true if the option that runs has used up its horizon.
     #[must_use]
     pub fn is_late(&self) -> bool {
-        self.actions >= self.link().option.horizon_actions()
+        self.actions() >= self.link().option.horizon_actions()
     }
 
-    /// Actions since the option that runs was entered.
+    /// Actions since the option that runs was entered, as they count against its horizon: where a speed limit makes a
+    /// robot slow, less than one each.
     #[must_use]
     pub const fn actions(&self) -> u32 {
-        self.actions
+        self.actions - self.spared as u32
     }
 
     fn enter(&mut self) {
@@ -183,6 +189,6 @@ impl Automaton {
         let guide = &self.links[self.visits.len()].option.guide;
         self.progress = GuideProgress::start(guide, &state.pose);
         self.visits.push(Visit { entry: state, time_s: 0.0 });
-        self.actions = 0;
+        (self.actions, self.spared) = (0, 0.0);
     }
 }

@@ -22,5 +22,6 @@ pub(crate) fn careful(situation: &Situation<'_>) -> Command {
     let reach_m = if robot.can_turn_in_place() { FAR_M } else { FAR_CAR_M };
     let bearing_rad = RULE.bearing_rad(&observation.state.pose, progress, guide);
     let speed_mps = CAREFUL_MPS.max(robot.min_speed_mps).min(robot.max_speed_mps);
-    compensated(world, situation, Command { reach_m, bearing_rad, speed_mps }, DRIFT_COMPENSATION)
+    let command = Command { reach_m, bearing_rad, speed_mps };
+    world.held(&observation.state.pose, compensated(world, situation, command, DRIFT_COMPENSATION))
 }

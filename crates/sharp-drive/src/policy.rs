@@ -89,8 +89,10 @@ impl OptionPolicy {
 }
 
 impl Policy for OptionPolicy {
+    /// What the policy decides, held to the speed limits of the world.
     fn decide(&mut self, situation: &Situation<'_>) -> Command {
-        self.inner().decide(situation)
+        let command = self.inner().decide(situation);
+        situation.world.held(&situation.observation.state.pose, command)
     }
 
     fn enter(&mut self, situation: &Situation<'_>) {

@@ -141,7 +141,8 @@ impl Controller for RouteController<'_> {
         }
         let Self { world, observation, progress, route, policy, .. } = self;
         let guide = GuideView { current: route, next: None };
-        Decision::Drive(policy.decide(&Situation { world, observation, progress, guide }))
+        let command = policy.decide(&Situation { world, observation, progress, guide });
+        Decision::Drive(world.held(&observation.state.pose, command))
     }
 
     fn observe(&mut self, motion: &Motion) {

@@ -255,6 +255,7 @@ impl RunningTask {
 
     fn step(&mut self, action: &[f32]) -> ActionOutcome {
         let command = self.interface.command(&self.automaton.situation(&self.world), action);
+        let command = self.world.held(&self.episode.state().pose, command);
         let motion = self.episode.act(command);
         let before = *self.automaton.progress();
         self.automaton.observe(&self.world, &motion);

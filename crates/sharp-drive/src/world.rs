@@ -4,9 +4,12 @@ use std::sync::Arc;
 
 use sharp_guide::{GuideRobot, InflatedRobot, Steering, inflated_robots};
 use sharp_sim::{ActionSettings, NoiseModel, ObstacleMap, RobotModel, Simulator, SimulatorKind, Vehicle};
-use sharp_space::{FootprintChecker, OccupancyGrid, RobotGeometry};
+use sharp_space::{FootprintChecker, OccupancyGrid, Pose, RobotGeometry};
 
+use crate::command::Command;
 use crate::motion_model::MotionModel;
+use crate::prior::Prior;
+use crate::speed_limits::SpeedLimits;
 
 /// A vehicle in a simulator that is chosen at run time.
 pub type AnyVehicle = Vehicle<Box<dyn Simulator>>;
@@ -24,6 +27,10 @@ pub struct World {
     pub obstacles: Arc<ObstacleMap>,
     /// Larger robots with wider bends, for which guides are planned first; the robot itself is the last.
     pub inflated: Arc<[InflatedRobot]>,
+    /// Speed limits by place, if there are any.
+    pub speed_limits: Option<Arc<SpeedLimits>>,
+    /// The prior of this robot in place of the shipped one of its kind.
+    pub own_prior: Option<Arc<Prior>>,
     /// What the robot's actions do, as policies expect it.
     pub(crate) model: Arc<MotionModel>,
 }
@@ -42,7 +49,32 @@ impl World {
         let obstacles = Arc::new(ObstacleMap::new(&grid, robot.footprint));
         let model = Arc::new(MotionModel::new(&robot));
         let inflated = inflated_robots(&geometry, robot.min_turning_radius_m()).into();
-        Self { grid: Arc::new(grid), robot: Arc::new(robot), geometry, obstacles, inflated, model }
+        let (grid, robot) = (Arc::new(grid), Arc::new(robot));
+        Self { grid, robot, geometry, obstacles, inflated, speed_limits: None, own_prior: None, model }
+    }
+
+    /// The same with speed limits.
+    #[must_use]
+    pub fn with_speed_limits(self, limits: SpeedLimits) -> Self {
+        Self { speed_limits: Some(Arc::new(limits)), ..self }
+    }
+
+    /// The same with a prior of its own.
+    #[must_use]
+    pub fn with_prior(self, prior: Prior) -> Self {
+        Self { own_prior: Some(Arc::new(prior)), ..self }
+    }
+
+    /// The prior that options begin with: the robot's own, or the shipped one of its kind.
+    #[must_use]
+    pub fn prior(&self) -> &Prior {
+        self.own_prior.as_deref().unwrap_or_else(|| Prior::shipped(&self.robot))
+    }
+
+    /// `command` for a robot at `pose`, no faster than the speed limits allow.
+    #[must_use]
+    pub fn held(&self, pose: &Pose, command: Command) -> Command {
+        self.speed_limits.as_ref().map_or(command, |limits| limits.held(pose, command))
     }
 
     /// How the robot steers.

@@ -127,12 +127,15 @@ struct LegPace {
 }
 
 impl LegPace {
-    /// The profile, faster or slower everywhere by one factor but nowhere above the top speed, so that `guide` takes
+    /// The profile, faster or slower everywhere by one factor but nowhere above the top speed or a speed limit, so that `guide` takes
     /// `time_s`. Where that cannot be, the robot cuts corners, and one speed above the top is all that fits.
     fn new(world: &World, profile: &SpeedProfile, guide: &GuidePath, time_s: f64) -> Self {
-        let (profiled, top_mps) = (profiled_speeds_mps(world, profile, guide), world.robot.max_speed_mps);
-        let at =
-            |factor: f64| profiled.iter().map(|speed| (factor * speed).min(top_mps)).collect::<Vec<f64>>();
+        let profiled = profiled_speeds_mps(world, profile, guide);
+        let limits_mps: Vec<f64> = guide.poses().iter().map(|pose| limit_mps(world, pose)).collect();
+        let at = |factor: f64| {
+            let speeds = profiled.iter().zip(&limits_mps).map(|(speed, limit)| (factor * speed).min(*limit));
+            speeds.collect::<Vec<f64>>()
+        };
         let (mut slow, mut fast) = (0.0, 1.0);
         while takes_s(guide, &at(fast)) > time_s && fast < FASTER_MAX {
             (slow, fast) = (fast, 2.0 * fast);
@@ -148,6 +151,12 @@ impl LegPace {
         let times_s = times_s(guide, &speeds_mps);
         Self { speeds_mps, times_s }
     }
+}
+
+/// The highest speed of the robot at `pose`, metres per second.
+fn limit_mps(world: &World, pose: &Pose) -> f64 {
+    let limit_mps = world.speed_limits.as_ref().map_or(f64::INFINITY, |limits| limits.at(pose.position));
+    world.robot.max_speed_mps.min(limit_mps)
 }
 
 /// When a robot with these speeds is at each pose of `guide`, seconds from the first.

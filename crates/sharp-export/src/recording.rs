@@ -40,6 +40,7 @@ pub fn planned_mcap(plan: &Plan) -> Result<Vec<u8>, RecordError> {
         .map(|(i, point)| Moment {
             time_s: point.time_s,
             state: planned_state(&path.points, i),
+            plan: 0,
             option: steps[point.step].option.id,
             command: None,
             is_recovering: false,

@@ -2,15 +2,13 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-use sharp_drive::{
-    Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, SuccessCount, Supervisor, TIME_LIMIT_MIN_S,
-};
-use sharp_sim::{NoiseModel, RobotState, Simulator, SimulatorKind};
+use sharp_drive::{EpisodeEnd, EpisodeRecord, EpisodeRules, SuccessCount, TIME_LIMIT_MIN_S};
+use sharp_sim::{NoiseModel, Simulator, SimulatorKind};
 use sharp_space::Seed;
 
-use crate::composed::{ComposedPolicy, Events};
+use crate::composed::Events;
 use crate::plan_file::Plan;
+use crate::tour::Tour;
 
 /// The time limit of an episode, in units of the predicted time.
 pub(crate) const TIME_LIMIT_FACTOR: f64 = 3.0;
@@ -66,32 +64,12 @@ pub struct Execution {
 /// Runs `plan`; `clock_us` tells the wall time in microseconds. Executions come in order.
 #[must_use]
 pub fn run(plan: &Arc<Plan>, settings: &RunSettings, clock_us: &(dyn Fn() -> f64 + Sync)) -> Vec<Execution> {
-    let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
-    episodes(plan, settings, |mut episode, mut policy| {
-        let end = episode.drive(&mut policy, &supervisor);
-        Execution { end, record: episode.into_record(), events: policy.events() }
-    })
+    Tour::from(Arc::clone(plan)).run(settings, clock_us)
 }
 
-/// Begins all episodes of `settings`, lets `drive` end each of them, and returns what it made of them, in order.
-pub(crate) fn episodes<T: Send>(
-    plan: &Arc<Plan>,
-    settings: &RunSettings,
-    drive: impl Fn(Episode, ComposedPolicy) -> T + Sync,
-) -> Vec<T> {
-    let rules = EpisodeRules::default()
-        .with_contact_ends(settings.contact_ends)
-        .with_time_limit_s(settings.time_limit_s)
-        .with_trace();
-    let vehicle = plan.world.vehicle(&*settings.simulator, &settings.noise, settings.contact_ends);
-    let episode = Episode::new(vehicle, rules);
-    let start = RobotState::at_rest(plan.solution.query.start);
-    let begin = |number: u32| {
-        let mut episode = episode.clone();
-        episode.begin(start, settings.seed, u64::from(number));
-        drive(episode, ComposedPolicy::new(Arc::clone(plan), start, settings.recovery))
-    };
-    (0..settings.episodes).into_par_iter().map(begin).collect()
+/// The rules that `settings` ask for.
+pub(crate) fn rules(settings: &RunSettings) -> EpisodeRules {
+    EpisodeRules::default().with_contact_ends(settings.contact_ends).with_time_limit_s(settings.time_limit_s)
 }
 
 /// Successes among `executions`.

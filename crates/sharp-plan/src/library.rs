@@ -167,6 +167,13 @@ impl OptionLibrary {
         if simulator != SimulatorKind::Kinematic {
             conditions += &format!(" {simulator:?}");
         }
+        if let Some(limits) = &world.speed_limits {
+            let text = ron::to_string(&**limits).expect("limits are plain numbers");
+            conditions += &format!(" {}", files::hash(text.as_bytes()));
+        }
+        if let Some(prior) = &world.own_prior {
+            conditions += &format!(" {}", files::hash(&prior.to_bytes()));
+        }
         let conditions = &files::hash(conditions.as_bytes())[..8];
         let map = &map_hash(&world.grid)[..16];
         let mut library = Self::open(root, &format!("{}-{conditions}-{map}", world.robot.name))?;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sharp_drive::{SuccessCount, SuccessEstimate, World};
+use sharp_drive::{SpeedLimits, SuccessCount, SuccessEstimate, World};
 use sharp_guide::{Departure, Goal, GuidePath, GuidedOption, LegId, OptionSpace};
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_rbvd::{Rbvd, StateAbstraction, StateId};
@@ -125,6 +125,8 @@ struct PlanFile {
     format: u32,
     map: String,
     robot: RobotModel,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    speed_limits: Option<SpeedLimits>,
     noise: NoiseModel,
     method: String,
     search: SearchSettings,
@@ -180,6 +182,7 @@ impl Plan {
             format: FORMAT,
             map: map_hash(&self.world.grid),
             robot: (*self.world.robot).clone(),
+            speed_limits: self.world.speed_limits.as_deref().cloned(),
             noise: self.noise.clone(),
             method: self.method.name.clone(),
             search: self.method.search,
@@ -207,6 +210,10 @@ impl Plan {
         let method = Method::of_plan(file.method, file.search, file.failure_cost_s);
         let space = abstraction.space(method.search.allowed);
         let world = World::new(grid, file.robot);
+        let world = match file.speed_limits {
+            Some(limits) => world.with_speed_limits(limits),
+            None => world,
+        };
         let tolerance_m = world.robot.goal_tolerance_m;
         let goal = Goal::new(file.goal.position, tolerance_m, world.geometry.clearance());
         let steps = file.steps.into_iter().map(|step| planned_option(step, folder, &space, goal.clone()));

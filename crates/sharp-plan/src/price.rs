@@ -59,7 +59,7 @@ impl<'a> Pricer<'a> {
     /// The policy whose drives the model prices: the prior.
     pub(crate) fn policy(&self) -> OptionPolicy {
         let caution = Prior::caution(self.failure_cost_s);
-        Prior::shipped(&self.world.robot).at(caution, &self.world.robot, &self.noise)
+        self.world.prior().at(caution, &self.world.robot, &self.noise)
     }
 
     /// The price of `option`, and the `next` guide after it where that is known.
@@ -78,14 +78,18 @@ impl<'a> Pricer<'a> {
 
     /// The price of the leg called `id` with `guide`, and the `next` one after it where that is known.
     pub(crate) fn of_guide(&self, id: LegId, guide: &GuidePath, next: Option<&GuidePath>) -> Price {
-        let time_s = match self.settings.price {
+        let at = |time_s| Price { time_s, success: 1.0 };
+        let price = match self.settings.price {
             PriceRule::Length => {
-                guide.length_m() / (self.settings.nominal_speed * self.world.robot.max_speed_mps)
+                at(guide.length_m() / (self.settings.nominal_speed * self.world.robot.max_speed_mps))
             }
-            PriceRule::Profile => PACE * self.profile.time_s(self.world, guide),
-            PriceRule::Model => return self.of_model(id, GuideView { current: guide, next }),
+            PriceRule::Profile => at(PACE * self.profile.time_s(self.world, guide)),
+            PriceRule::Model => self.of_model(id, GuideView { current: guide, next }),
         };
-        Price { time_s, success: 1.0 }
+        let Some(limits) = &self.world.speed_limits else { return price };
+        // None of the rules knows of speed limits: they count from the mean speed on.
+        let delay_s = limits.delay_s(guide, guide.length_m() / price.time_s);
+        if delay_s.is_finite() { Price { time_s: price.time_s + delay_s, ..price } } else { price }
     }
 
     fn of_model(&self, id: LegId, guide: GuideView<'_>) -> Price {

@@ -6,9 +6,9 @@ use sharp_drive::{Command, Controller, Decision, Motion, Readiness, Supervisor};
 use sharp_guide::LegId;
 use sharp_sim::RobotState;
 
-use crate::composed::ComposedPolicy;
-use crate::execute::{Execution, RunSettings, episodes};
+use crate::execute::{Execution, RunSettings, rules};
 use crate::plan_file::Plan;
+use crate::tour::{Tour, TourPolicy};
 
 /// The robot at the moment of a decision, or at the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Moment {
     pub time_s: f64,
     /// Pose and motion.
     pub state: RobotState,
+    /// Which plan of a tour runs, from 0; 0 where there is one plan.
+    pub plan: usize,
     /// The option that runs.
     pub option: LegId,
     /// What was decided; `None` at the end and where the robot backs off.
@@ -41,20 +43,32 @@ pub fn record(
     settings: &RunSettings,
     clock_us: &(dyn Fn() -> f64 + Sync),
 ) -> Vec<Recording> {
-    let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
-    episodes(plan, settings, |mut episode, policy| {
-        let mut noted = NotedPolicy { policy, state: *episode.state(), time_s: 0.0, moments: Vec::new() };
-        let end = episode.drive(&mut noted, &supervisor);
-        noted.note(None);
-        let execution = Execution { end, record: episode.into_record(), events: noted.policy.events() };
-        Recording { execution, moments: noted.moments }
-    })
+    Tour::from(Arc::clone(plan)).record(settings, clock_us)
 }
 
-/// A composed policy whose decisions are noted.
+impl Tour {
+    /// Runs the tour as [`Tour::run`] does, and keeps every moment.
+    #[must_use]
+    pub fn record(&self, settings: &RunSettings, clock_us: &(dyn Fn() -> f64 + Sync)) -> Vec<Recording> {
+        let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
+        let last = self.plans.len() - 1;
+        self.episodes(settings, rules(settings).with_trace(), |mut episode, policy| {
+            let state = *episode.state();
+            let mut noted = NotedPolicy { policy, last, state, time_s: 0.0, moments: Vec::new() };
+            let end = episode.drive(&mut noted, &supervisor);
+            noted.note(None);
+            let execution = Execution { end, record: episode.into_record(), events: noted.policy.events() };
+            Recording { execution, moments: noted.moments }
+        })
+    }
+}
+
+/// A policy whose decisions are noted.
 #[derive(Debug)]
 struct NotedPolicy {
-    policy: ComposedPolicy,
+    policy: TourPolicy,
+    /// The number of the last plan.
+    last: usize,
     state: RobotState,
     time_s: f64,
     moments: Vec<Moment>,
@@ -69,6 +83,7 @@ impl NotedPolicy {
         self.moments.push(Moment {
             time_s: self.time_s,
             state: self.state,
+            plan: self.last - self.policy.goals_to_come(),
             option: self.policy.option().id,
             command,
             is_recovering: self.policy.is_recovering(),
@@ -121,6 +136,7 @@ mod tests {
             options.dedup();
             let planned: Vec<_> = plan.solution.steps.iter().map(|step| step.option.id).collect();
             assert_eq!(options, planned, "one option after the other");
+            assert!(moments.iter().all(|moment| moment.plan == 0), "there is one plan");
         }
     }
 }

@@ -19,7 +19,7 @@ use sharp_sim::{RobotState, Simulator};
 use sharp_space::{OccupancyGrid, Pose, Seed};
 
 use crate::composed::{ComposedPolicy, Events};
-use crate::execute::{Execution, RunSettings, TIME_LIMIT_FACTOR};
+use crate::execute::{Execution, RunSettings, TIME_LIMIT_FACTOR, rules};
 use crate::files::{self, FileError};
 use crate::plan_file::Plan;
 
@@ -96,11 +96,7 @@ impl Tour {
     /// Runs the tour; `clock_us` tells the wall time in microseconds. Executions come in order.
     #[must_use]
     pub fn run(&self, settings: &RunSettings, clock_us: &(dyn Fn() -> f64 + Sync)) -> Vec<Execution> {
-        let rules = EpisodeRules::default()
-            .with_contact_ends(settings.contact_ends)
-            .with_time_limit_s(settings.time_limit_s)
-            .with_trace();
-        self.drive(settings, rules, clock_us)
+        self.drive(settings, rules(settings).with_trace(), clock_us)
     }
 
     fn drive(
@@ -109,19 +105,30 @@ impl Tour {
         rules: EpisodeRules,
         clock_us: &(dyn Fn() -> f64 + Sync),
     ) -> Vec<Execution> {
+        let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
+        self.episodes(settings, rules, |mut episode, mut policy| {
+            let end = episode.drive(&mut policy, &supervisor);
+            Execution { end, record: episode.into_record(), events: policy.events() }
+        })
+    }
+
+    /// Begins all episodes of `settings`, lets `drive` end each of them, and returns what it made of them, in order.
+    pub(crate) fn episodes<T: Send>(
+        &self,
+        settings: &RunSettings,
+        rules: EpisodeRules,
+        drive: impl Fn(Episode, TourPolicy) -> T + Sync,
+    ) -> Vec<T> {
         let first = &self.plans[0];
         let vehicle = first.world.vehicle(&*settings.simulator, &settings.noise, settings.contact_ends);
         let episode = Episode::new(vehicle, rules);
-        let supervisor = Supervisor { clock_us, ..Supervisor::silent() };
         let start = RobotState::at_rest(first.solution.query.start);
-        let execute = |number: u32| {
+        let begin = |number: u32| {
             let mut episode = episode.clone();
             episode.begin(start, settings.seed, u64::from(number));
-            let mut policy = TourPolicy::new(self.plans.clone(), start, settings.recovery);
-            let end = episode.drive(&mut policy, &supervisor);
-            Execution { end, record: episode.into_record(), events: policy.events() }
+            drive(episode, TourPolicy::new(self.plans.clone(), start, settings.recovery))
         };
-        (0..settings.episodes).into_par_iter().map(execute).collect()
+        (0..settings.episodes).into_par_iter().map(begin).collect()
     }
 
     /// The folder of plan number `index` of the tour in `folder`.

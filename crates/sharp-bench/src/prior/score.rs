@@ -69,6 +69,6 @@ pub fn prior_candidates(
     let paced = ProfiledFollower::candidates(robot).into_iter().map(OptionPolicy::Profiled).collect();
     let mut all = named("prior", prior.candidates(robot, noise));
     all.extend(named("follower", followers));
-    all.extend(named("paced", paced));
+    all.extend(named("profiled", paced));
     all
 }

@@ -64,8 +64,9 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
             if json {
                 say!("{}", to_json(&info));
             } else {
+                let bounds = map.grid.frame().bounds();
                 say!(
-                    "{}: {} x {} cells of {} m = {:.1} x {:.1} m, origin ({}, {}, {})\n{:.1} m2 free ({:.1} %), {:.1} % occupied, {:.1} % unknown, {} problems",
+                    "{}: {} x {} cells of {} m = {:.1} x {:.1} m, origin ({}, {}, {})\nx from {:.2} to {:.2}, y from {:.2} to {:.2}\n{:.1} m2 free ({:.1} %), {:.1} % occupied, {:.1} % unknown, {} problems",
                     info.map.name,
                     info.width,
                     info.height,
@@ -75,6 +76,10 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
                     info.origin[0],
                     info.origin[1],
                     info.origin[2],
+                    bounds.min.x,
+                    bounds.max.x,
+                    bounds.min.y,
+                    bounds.max.y,
                     info.free_m2,
                     100.0 * info.free,
                     100.0 * info.occupied,

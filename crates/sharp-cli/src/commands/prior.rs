@@ -187,7 +187,8 @@ fn read(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
     }
 }
 
-fn prior_file(path: &Path) -> Result<Prior, Failure> {
+/// Reads the prior in the file at `path`.
+pub(crate) fn prior_file(path: &Path) -> Result<Prior, Failure> {
     let missing = || Failure::new("FILE_UNREADABLE", format!("{}: no such file", path.display()));
     Prior::from_bytes(&read(path)?.ok_or_else(missing)?).map_err(|error| invalid(path, &error))
 }

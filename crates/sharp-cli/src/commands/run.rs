@@ -3,13 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use sharp_bench::{RunReport, clock_us, named, pictures};
+use sharp_bench::{PlanPage, RunReport, clock_us, named, pictures};
 use sharp_export::driven_mcap;
 use sharp_maps::{LoadOptions, load};
-use sharp_plan::{Execution, Plan, RunSettings, Tour, record, write_atomic};
+use sharp_plan::{Execution, Plan, Tour, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{Collisions, Run, Switch};
+use crate::commands::show;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::{input, progress};
 
@@ -24,16 +25,28 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     settings.recovery = args.recovery == Switch::On;
     settings.contact_ends = args.collisions == Collisions::End;
 
+    if args.record.is_some() && tour.plans.len() > 1 {
+        let count = tour.plans.len();
+        let message =
+            format!("--record: the plan has {count} goals in a row, expected one; record each goal-N");
+        return Err(Failure::new("USAGE", message));
+    }
     let spinner = progress::spinner("driving");
-    let episodes = match (&args.record, &tour.plans[..]) {
-        (None, _) => tour.run(&settings, &clock_us()),
-        (Some(file), [plan]) => recorded(plan, &settings, file)?,
-        (Some(_), plans) => {
-            let count = plans.len();
-            let message =
-                format!("--record: the plan has {count} goals in a row, expected one; record each goal-N");
-            return Err(Failure::new("USAGE", message));
-        }
+    let is_kept = args.record.is_some() || args.show.is_some();
+    let recordings = if is_kept { tour.record(&settings, &clock_us()) } else { vec![] };
+    if let Some(file) = &args.record {
+        write_atomic(file, &driven_mcap(&tour.plans[0], &recordings)?)?;
+    }
+    if let Some(file) = &args.show {
+        let map = map_name(&args.plan_dir);
+        let shown = PlanPage { map: &map, tour: &tour, recordings: &recordings, library: None };
+        let path = show::write(&shown, &args.plan_dir, file.as_deref())?;
+        eprintln!("page written to {}", path.display());
+    }
+    let episodes: Vec<Execution> = if is_kept {
+        recordings.into_iter().map(|recording| recording.execution).collect()
+    } else {
+        tour.run(&settings, &clock_us())
     };
     spinner.finish_and_clear();
     let report = RunReport::predicted(tour.predicted, &episodes);
@@ -63,15 +76,16 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
             report.decision_us.p50,
             report.decision_us.p99
         );
+        say!("picture: {}", args.plan_dir.join("run.png").display());
     }
     Ok(Exit::Done)
 }
 
-/// Runs `plan` and writes what was driven to `file`.
-fn recorded(plan: &Arc<Plan>, settings: &RunSettings, file: &Path) -> Result<Vec<Execution>, Failure> {
-    let recordings = record(plan, settings, &clock_us());
-    write_atomic(file, &driven_mcap(plan, &recordings)?)?;
-    Ok(recordings.into_iter().map(|recording| recording.execution).collect())
+/// The name of the map that the plan in `folder` was made for, as its report says; else the folder's own.
+fn map_name(folder: &Path) -> String {
+    let report = std::fs::read(folder.join("solve.json")).unwrap_or_default();
+    let report: serde_json::Value = serde_json::from_slice(&report).unwrap_or_default();
+    report["map"]["name"].as_str().map_or_else(|| folder.display().to_string(), str::to_owned)
 }
 
 /// Reads the plan or the plans in a row in `folder` with their map.

@@ -1,13 +1,16 @@
 //! `sharp solve`: Algorithm 1, from a map and a problem to a policy on disk.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use sharp_bench::{NamedProblem, SolveReport, SolveSettings, Stopwatch, TimedMonitor, solve, solve_tour};
-use sharp_plan::{Method, Monitor};
+use sharp_plan::{Method, Monitor, OptionLibrary, Tour};
 use sharp_space::Pose;
 
 use crate::args::{Guide, Solve, Switch};
+use crate::commands::prior::prior_file;
+use crate::commands::show;
 use crate::input::{self, HeadingRule};
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{SolveMonitor, is_interrupted, spinner};
@@ -28,14 +31,23 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     }
     let map = input::map(&args.map)?;
     let query = input::query(&map, &args.problem)?;
-    let problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
+    let mut problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
+    if let Some(limits) = input::speed_limits(&args.speed, &args.map, problem.world.robot.max_speed_mps)? {
+        problem.world = problem.world.with_speed_limits(limits);
+    }
+    if let Some(file) = &args.prior {
+        problem.world = problem.world.with_prior(prior_file(file)?);
+    }
     let settings = SolveSettings {
         abstraction: args.abstraction.request(),
         method: method(args)?,
         simulator: input::simulator(&args.simulator)?,
         seed,
     };
-    args.out.as_deref().map_or(Ok(()), input::check_out)?;
+    args.out.as_deref().map_or(Ok(()), |folder| input::check_out("--out", folder))?;
+    if let Some(folder) = args.show.iter().flatten().filter_map(|file| file.parent()).next() {
+        input::check_out("--show", folder)?;
+    }
     let library = input::library(args.library.as_deref());
 
     let vias = args.via.iter().map(|via| input::pose("--via", via, HeadingRule::Free));
@@ -48,9 +60,10 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
         let is_time_up = monitor.should_stop();
         spinner.finish();
         hold_to(&mut solved.report, args.min_success);
-        if solved.plan.is_some() {
-            let folder = plan_folder(args, &problem)?;
+        if let Some(plan) = &solved.plan {
+            let (folder, tour) = (plan_folder(args, &problem)?, Tour::from(Arc::new(plan.clone())));
             solved.write(&folder, &folder)?;
+            shown(args, (&tour, &problem.map), Some(solved.library()), (seed, &folder))?;
         }
         solved.save_library()?;
         (solved.report, is_time_up)
@@ -63,6 +76,9 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
         if solved.tour.is_some() {
             let folder = plan_folder(args, &problem)?;
             solved.write(&folder, &folder)?;
+        }
+        if let (Some(tour), Some(folder)) = (&solved.tour, &solved.report.plan_dir) {
+            shown(args, (tour, &problem.map), None, (seed, Path::new(folder)))?;
         }
         (solved.report, is_time_up)
     };
@@ -115,6 +131,20 @@ fn method(args: &Solve) -> Result<Method, Failure> {
         (method.verify_episodes, method.verify_half_width) = (episodes.ok_or_else(usage)?, 0.0);
     }
     Ok(if args.guide == Guide::Paper { method.with_learn_and_link() } else { method })
+}
+
+/// Writes the page of the plan in `folder` where it is wanted, and says where it is.
+fn shown(
+    args: &Solve,
+    plan: (&Tour, &str),
+    library: Option<&OptionLibrary>,
+    (seed, folder): (u64, &Path),
+) -> Result<(), Failure> {
+    if let Some(file) = &args.show {
+        let path = show::solved(plan, library, seed, (folder, file.as_deref()))?;
+        eprintln!("page written to {}", path.display());
+    }
+    Ok(())
 }
 
 /// The folder asked for, or a fresh one.

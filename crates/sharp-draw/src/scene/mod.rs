@@ -13,7 +13,7 @@ mod viewport;
 
 use sharp_space::{Cell, Footprint, OccupancyGrid, Point, Pose, Region};
 
-use self::viewport::Viewport;
+pub(crate) use self::viewport::Viewport;
 use crate::color::Color;
 use crate::svg::Svg;
 

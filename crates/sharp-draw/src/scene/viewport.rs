@@ -9,7 +9,7 @@ const MARGIN: f64 = 0.02;
 
 /// A rectangle of cells, line 0 at the top of the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Viewport {
+pub(crate) struct Viewport {
     frame: GridFrame,
     left: usize,
     top: usize,
@@ -19,7 +19,7 @@ pub(super) struct Viewport {
 
 impl Viewport {
     /// The rectangle around all known cells with a margin; everything if nothing is known.
-    pub(super) fn of_known(grid: &OccupancyGrid) -> Self {
+    pub(crate) fn of_known(grid: &OccupancyGrid) -> Self {
         let frame = *grid.frame();
         let known = (0..frame.len()).filter(|&index| grid.cells()[index] != Occupancy::Unknown);
         let (mut low, mut high) = ((frame.width, frame.height), (0, 0));
@@ -37,7 +37,7 @@ impl Viewport {
     }
 
     /// Left, top, width and height, cells.
-    pub(super) fn in_cells(&self) -> [f64; 4] {
+    pub(crate) fn in_cells(&self) -> [f64; 4] {
         [self.left, self.top, self.width, self.height].map(|cells| cells as f64)
     }
 

@@ -12,6 +12,7 @@ mod picture;
 mod ros;
 mod save;
 mod scenario;
+mod value_mask;
 
 #[cfg(test)]
 mod drivable;
@@ -24,3 +25,4 @@ pub use load::{LoadOptions, MapFile, Problem, load};
 pub use named::named_maps;
 pub use save::save_ros;
 pub use scenario::{MovingAiProblem, load_scenario};
+pub use value_mask::{ValueMask, load_values};

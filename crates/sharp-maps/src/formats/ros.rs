@@ -96,6 +96,38 @@ pub(crate) fn load(
     warnings: &mut Vec<String>,
 ) -> Result<OccupancyGrid, MapError> {
     let file = path.display().to_string();
+    let (description, picture) = read(path, options, warnings)?;
+    warnings.extend(unknown_as_free(&file, &picture, &description.rules));
+    to_grid(&file, &picture, &description)
+}
+
+/// Reads the frame and the values (-1 or 0 to 100, row-major from the lower left cell) that Nav2 publishes for the map
+/// described by the YAML file at `path`.
+pub(crate) fn values(
+    path: &Path,
+    options: &LoadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<(GridFrame, Vec<i8>), MapError> {
+    let file = path.display().to_string();
+    let (description, picture) = read(path, options, warnings)?;
+    // What is a sound grid has a sound frame.
+    let frame = *to_grid(&file, &picture, &description)?.frame();
+    let GreyImage { width, grey, transparent, .. } = &picture;
+    let transparent = transparent.as_ref().filter(|_| description.rules.mode != GreyMode::Raw);
+    let is_transparent = |index: usize| transparent.is_some_and(|transparent| transparent[index]);
+    let value =
+        |index: usize| if is_transparent(index) { UNKNOWN } else { description.rules.value_of(grey[index]) };
+    let rows = (0..picture.height).rev();
+    Ok((frame, rows.flat_map(|row| row * width..(row + 1) * width).map(value).collect()))
+}
+
+/// Reads the YAML file at `path` and the image that it names.
+fn read(
+    path: &Path,
+    options: &LoadOptions,
+    warnings: &mut Vec<String>,
+) -> Result<(RosDescription, GreyImage), MapError> {
+    let file = path.display().to_string();
     let bytes = files::read(path, FileKind::Text)?;
     let description = describe(&file, files::as_text(&file, &bytes)?)?;
     let GreyRules { occupied_threshold, free_threshold, .. } = description.rules;
@@ -110,8 +142,7 @@ pub(crate) fn load(
     let picture = files::read(&image, FileKind::Cells).and_then(|bytes| picture::decode(&image_file, &bytes));
     let picture = picture.map_err(|source| in_image(&file, &description.image, source))?;
     warnings.extend(picture.warning.iter().map(|warning| format!("{image_file}: {warning}")));
-    warnings.extend(unknown_as_free(&file, &picture, &description.rules));
-    to_grid(&file, &picture, &description)
+    Ok((description, picture))
 }
 
 /// The image that the YAML file at `path` names, if it is a sound description of a map.

@@ -1,10 +1,8 @@
 //! The prior as it is, to compare with: nothing to choose from and no training.
 
-use sharp_drive::Prior;
-
 use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner};
 
-/// Takes the shipped prior at full caution.
+/// Takes the prior at full caution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PriorOnly;
 
@@ -15,7 +13,7 @@ impl OptionLearner for PriorOnly {
         _monitor: &dyn LearningMonitor,
     ) -> Result<LearntPolicy, LearnFailure> {
         let robot = &task.world.robot;
-        let policy = Prior::shipped(robot).policy(robot, &task.conditions.noise);
+        let policy = task.world.prior().policy(robot, &task.conditions.noise);
         let judged = task.judge(&policy);
         let estimate = task.estimate_alone(&policy, judged);
         Ok(LearntPolicy::untrained(policy, estimate))

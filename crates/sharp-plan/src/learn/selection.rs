@@ -160,7 +160,7 @@ impl Selection {
     ) -> Result<LearntPolicy, LearnFailure> {
         let robot = &task.world.robot;
         let reward = ProgressReward { contact: FINE_CONTACT, ..ProgressReward::default() };
-        let actor = Prior::shipped(robot).actor().clone();
+        let actor = task.world.prior().actor().clone();
         let networks = SacState::with_actor(actor, &self.train.sac, &mut task.seed.stream("critics", 0));
         let start = SacStart::Networks(Box::new(networks));
         let learner = SacLearner::new(self.train.clone()).with_start(start);
@@ -177,7 +177,7 @@ impl Selection {
 /// The prior at the caution that fits the price of a failure.
 fn prior(task: &LearningTask<'_>) -> OptionPolicy {
     let (robot, noise) = (&task.world.robot, &task.conditions.noise);
-    Prior::shipped(robot).at(Prior::caution(task.failure_cost_s), robot, noise)
+    task.world.prior().at(Prior::caution(task.failure_cost_s), robot, noise)
 }
 
 /// Successive halving (Jamieson and Talwalkar 2016): each round compares fewer candidates on more episodes.

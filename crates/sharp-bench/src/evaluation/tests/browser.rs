@@ -1,11 +1,9 @@
 //! The page as a browser shows it, on a desk and on a telephone; where there is no browser, the test says so.
 
 use std::path::Path;
-use std::process::Command;
 
 use super::tests::{evaluate, whole};
-
-const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+use crate::tests::browser::{browser, title_after};
 
 /// Opens the page in a frame of WIDTH pixels, unfolds everything, and writes what it finds to the title:
 /// pixels by which the page is too wide, figures, figures without area, pixels of the smallest text,
@@ -27,38 +25,17 @@ frame.onload = () => {
 };
 </script>"#;
 
-/// The name of a browser that can be called, if there is one.
-fn browser() -> Option<&'static str> {
-    let works =
-        |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|it| it.status.success());
-    BROWSERS.into_iter().find(works)
-}
-
 /// What [`FRAME`] finds in a page that is shown `width_px` wide, and what the browser complained of.
 fn look(browser: &str, report: &Path, width_px: u32) -> (Vec<i64>, String) {
-    let frame = report.join(format!("frame-{width_px}.html"));
-    std::fs::write(&frame, FRAME.replace("WIDTH", &width_px.to_string())).expect("a file");
-    let output = Command::new(browser)
-        .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"])
-        .args(["--virtual-time-budget=10000", "--enable-logging=stderr", "--dump-dom"])
-        .arg(format!("--user-data-dir={}", report.join("profile").display()))
-        .arg(format!("file://{}", frame.display()))
-        .output()
-        .expect("the browser runs");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let title = text.split("<title>seen ").nth(1).and_then(|rest| rest.split('<').next());
-    let title = title.unwrap_or_else(|| panic!("the page was not seen: {text}"));
+    let frame = FRAME.replace("WIDTH", &width_px.to_string());
+    let (title, complaints) = title_after(browser, report, &frame);
     let numbers = title.split(' ').map(|number| number.parse().expect("a number")).collect();
-    let complaints = String::from_utf8_lossy(&output.stderr).into_owned();
-    (numbers, complaints.lines().filter(|line| line.contains("CONSOLE")).collect())
+    (numbers, complaints)
 }
 
 #[test]
 fn a_browser_draws_every_figure_on_a_desk_and_on_a_telephone() {
-    let Some(browser) = browser() else {
-        eprintln!("skipped: none of {BROWSERS:?} can be called");
-        return;
-    };
+    let Some(browser) = browser() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let html = evaluate(&whole(), folder.path());
     let panels: usize = html
