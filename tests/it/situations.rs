@@ -82,13 +82,13 @@ fn departure(solution: &Solution) -> Departure {
 fn nose_in_at_a_wall_a_robot_backs_off_first() {
     for robot in [RobotModel::husky(), RobotModel::limo()] {
         let nose_m = robot.footprint.half_length_m();
-        // 15 cm before the wall at the left, which it faces.
-        let query = from_to([0.1 + 0.15 + nose_m, 2.0, std::f64::consts::PI], [5.0, 2.5, 0.0]);
+        // 8 cm before the wall at the left, which it faces.
+        let query = from_to([0.1 + 0.08 + nose_m, 2.0, std::f64::consts::PI], [5.0, 2.5, 0.0]);
         let name = robot.name.clone();
         let (_, solution, reached) = solved(room((6.0, 5.0), &[]), robot, query);
         assert!(departure(&solution).back_off_m > 0.0, "{name}: {:?}", departure(&solution));
-        assert!(solution.predicted.rate() > 0.9, "{name}: {:?}", solution.predicted);
-        assert!(reached >= 25, "{name}: {reached} of 30 arrived");
+        assert!(solution.predicted.rate() > 0.8, "{name}: {:?}", solution.predicted);
+        assert!(reached >= 22, "{name}: {reached} of 30 arrived");
     }
 }
 
