@@ -37,6 +37,7 @@ mod error;
 mod evaluation;
 mod jobs;
 mod json;
+mod learn;
 mod measure;
 mod prior;
 mod reports;
@@ -59,6 +60,7 @@ pub use jobs::{
     count_results, merge, run_job, unfinished,
 };
 pub use json::to_json;
+pub use learn::{BuildingSuccess, LearnReport, LearntBuilding, NamedWorld, WeakReport, learn};
 pub use measure::{BaselineKind, BaselineSettings, MeasureMonitor, measure};
 pub use named::{InputError, NamedProblem};
 pub use prior::{

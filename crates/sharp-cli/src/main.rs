@@ -40,6 +40,7 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
     }
     match &cli.command {
         Subcommands::Solve(args) => commands::solve::run(args, cli.seed, cli.json),
+        Subcommands::Learn(args) => commands::learn::run(args, cli.seed, cli.json),
         Subcommands::Run(args) => commands::run::run(args, cli.seed, cli.json),
         Subcommands::Export(args) => commands::export::run(args, cli.json),
         Subcommands::Serve(args) => commands::serve::run(args),

@@ -132,7 +132,28 @@ impl<'a> MonteCarlo<'a> {
         })
     }
 
-    /// The same, but stops after a block of runs as soon as `is_enough` of all so far.
+    /// Runs the chain of `drivers` from `states`, as often as asked for, and stops after a block of runs as soon as
+    /// `is_enough` of all so far.
+    #[must_use]
+    pub fn runs_from(
+        &self,
+        drivers: &[Driver<'_>],
+        states: &InitialStates,
+        is_enough: impl Fn(&[ChainRun]) -> bool,
+    ) -> Vec<ChainRun> {
+        let mut runs = Vec::with_capacity(self.episodes as usize);
+        while runs.len() < self.episodes as usize && (runs.is_empty() || !is_enough(&runs)) {
+            let next = runs.len() as u32;
+            let block = next..self.episodes.min(next + BLOCK);
+            runs.extend(self.parallel(drivers, block, |chain, episode, number| {
+                let start = states.draw(&mut self.seed.stream("trial start", number));
+                chain.run(self.world, episode, start, (self.seed, number))
+            }));
+        }
+        runs
+    }
+
+    /// The same from `start`.
     #[must_use]
     pub fn runs_until(
         &self,

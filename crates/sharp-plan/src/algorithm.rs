@@ -13,6 +13,7 @@ use sharp_guide::{GuidedOption, LegId, join_guides};
 use crate::abstraction::Abstraction;
 use crate::files::FileError;
 use crate::learn::learn_missing;
+use crate::known::KnownOptions;
 use crate::library::OptionLibrary;
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
@@ -20,7 +21,7 @@ use crate::query::Phase;
 use crate::reason::obstruction;
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
-use crate::verify::{PlannedOption, Solution, verify};
+use crate::verify::{PlannedOption, Solution, predict, verify};
 
 /// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
@@ -47,7 +48,22 @@ pub fn solve(
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
 ) -> Result<Outcome, FileError> {
-    let outcome = algorithm_1(problem, abstraction, library);
+    let PlanningProblem { world, method, conditions, .. } = *problem;
+    let known = KnownOptions::new(world, abstraction, method, &conditions.noise, library);
+    solve_with(problem, abstraction, library, &Arc::new(known))
+}
+
+/// The same, where `known` was made of the library beforehand, for this abstraction and method.
+///
+/// # Errors
+/// Returns an error if the library cannot be written.
+pub(crate) fn solve_with(
+    problem: &PlanningProblem<'_>,
+    abstraction: &Abstraction,
+    library: &mut OptionLibrary,
+    known: &Arc<KnownOptions>,
+) -> Result<Outcome, FileError> {
+    let outcome = algorithm_1(problem, abstraction, library, known);
     problem.monitor.phase(Phase::Done);
     outcome
 }
@@ -57,13 +73,13 @@ fn algorithm_1(
     problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
+    known: &Arc<KnownOptions>,
 ) -> Result<Outcome, FileError> {
     let PlanningProblem { world, method, conditions, query, seed, monitor } = *problem;
     monitor.phase(Phase::Search);
     // 8: s_i, s_g <- get_abstract_states(x_i, x_g)
-    let known = Policies::guides(library);
-    let mut search = match Search::new(world, abstraction, method, &conditions.noise, query, known, seed) {
-        Ok(search) => search,
+    let mut search = match Search::new(world, abstraction, method, &conditions.noise, query, [], seed) {
+        Ok(search) => search.with_known(Arc::clone(known)),
         Err(unplaced) => return Ok(Outcome::NoPlan(describe(problem, &unplaced.to_string()))),
     };
     let mut policies = Policies::new(library);
@@ -96,12 +112,17 @@ fn algorithm_1(
         }
         // Beyond the paper: Pi is repaired and measured, and the search looks again while another plan seems cheaper.
         monitor.phase(Phase::Verify);
-        let is_stopped = !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)?;
-        let solution = verify(problem, &p, &policies);
+        let is_composed = method.verify_episodes == 0;
+        let is_stopped =
+            !is_composed && !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)?;
+        let solution = match is_composed {
+            true => predict(problem, &p, &policies, known),
+            false => verify(problem, &p, &policies),
+        };
         verified += 1;
         search.offer_direct();
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
-        let cost_s = |solution: &Solution| solution.estimate().cost_s(method.failure_cost_s);
+        let cost_s = |solution: &Solution| solution.cost_s(method.failure_cost_s);
         if best.as_ref().is_none_or(|best| cost_s(&solution) < cost_s(best)) {
             best = Some(solution);
         }

@@ -33,6 +33,13 @@ pub(crate) struct Price {
     success: f64,
 }
 
+impl Price {
+    /// Mean time of a success, seconds, and the chance of it.
+    pub(crate) const fn parts(&self) -> (f64, f64) {
+        (self.time_s, self.success)
+    }
+}
+
 impl<'a> Pricer<'a> {
     pub(crate) fn new(
         world: &'a World,

@@ -20,6 +20,7 @@ use sharp_sim::NoiseModel;
 use sharp_space::{Cell, Point, Pose, Seed, trig};
 
 use crate::abstraction::Abstraction;
+use crate::known::KnownOptions;
 use crate::method::{Method, PriceRule, SearchSettings};
 use crate::option_graph::{Candidate, OptionGraph};
 use crate::price::{Price, Pricer};
@@ -49,6 +50,8 @@ pub struct Search<'a> {
     prices: BTreeMap<LegId, Price>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
+    /// Options that are at hand from the beginning, the same for every search of a building.
+    known: Option<Arc<KnownOptions>>,
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
     charges: BTreeMap<(LegId, LegId), f64>,
     seed: Seed,
@@ -100,6 +103,7 @@ impl<'a> Search<'a> {
             pricer: Pricer::new(world, noise, method.search, method.failure_cost_s),
             prices: BTreeMap::new(),
             offers_direct: false,
+            known: None,
             charges: BTreeMap::new(),
             seed,
         };
@@ -110,6 +114,12 @@ impl<'a> Search<'a> {
             }
         }
         Ok(this)
+    }
+
+    /// The same with the guides, prices and hand-overs of `known`, which were made for this method.
+    #[must_use]
+    pub(crate) fn with_known(self, known: Arc<KnownOptions>) -> Self {
+        Self { known: Some(known), ..self }
     }
 
     /// From now on a plan may go from start to goal without any option, through all states, if the method allows it:
@@ -135,15 +145,31 @@ impl<'a> Search<'a> {
             monitor.phase(Phase::Search);
             let (cost_s, ids) = self.cheapest(measured)?;
             let missing: Vec<LegId> =
-                ids.iter().copied().filter(|id| !self.guided.contains_key(id)).collect();
+                ids.iter().copied().filter(|&id| self.found(id).is_none()).collect();
             if missing.is_empty() {
-                let options: Option<_> = ids.iter().map(|id| self.guided[id].clone().ok()).collect();
+                let options: Option<_> = ids.iter().map(|&id| self.found(id)?.ok().cloned()).collect();
                 return options.map(|options| (cost_s, options));
             }
             monitor.phase(Phase::Guide);
-            let guided: Vec<_> = missing.par_iter().map(|&id| (id, self.guide(id))).collect();
-            guided.into_iter().for_each(|(id, option)| self.keep(id, option));
+            self.guide_all(&missing);
         }
+    }
+
+    /// Plans the guides of all of `ids`.
+    pub(crate) fn guide_all(&mut self, ids: &[LegId]) {
+        let guided: Vec<_> = ids.par_iter().map(|&id| (id, self.guide(id))).collect();
+        guided.into_iter().for_each(|(id, option)| self.keep(id, option));
+    }
+
+    /// What became of guiding the option called `id`; `None` if nobody tried.
+    pub(crate) fn found(&self, id: LegId) -> Option<Result<&Arc<GuidedOption>, &NoGuide>> {
+        let known = || self.known.as_ref()?.found(id);
+        self.guided.get(&id).map(Result::as_ref).or_else(known)
+    }
+
+    /// The price of a guided option.
+    fn price(&self, id: LegId) -> Option<&Price> {
+        self.prices.get(&id).or_else(|| self.known.as_ref()?.price(id))
     }
 
     /// Notes the guide of the option called `id`, or that it has none.
@@ -159,7 +185,9 @@ impl<'a> Search<'a> {
         let top_speed = self.world.robot.max_speed_mps;
         let cost = |option: &Candidate| self.cost_s(option, measured(option.id()));
         let charge = |before: &Candidate, after: &Candidate| {
-            self.charges.get(&(before.id(), after.id())).copied().unwrap_or(0.0)
+            let pair = (before.id(), after.id());
+            let known = || self.known.as_ref()?.charge(pair);
+            self.charges.get(&pair).copied().or_else(known).unwrap_or(0.0)
         };
         let strict =
             |before: &Candidate, after: &Candidate| self.hand_over_s(before, after) + charge(before, after);
@@ -173,7 +201,24 @@ impl<'a> Search<'a> {
 
     /// The option called `id` with a guide of its own, if it was guided.
     pub(crate) fn option(&self, id: LegId) -> Option<&GuidedOption> {
-        self.guided.get(&id).and_then(|option| option.as_deref().ok())
+        self.found(id).and_then(Result::ok).map(|option| &**option)
+    }
+
+    /// The options of the problem, and which may follow which.
+    pub(crate) const fn graph(&self) -> &OptionGraph {
+        &self.graph
+    }
+
+    /// Whether the robot can go on from the option called `before` to the one called `after` without a turn that it should
+    /// not make; true where one of them has no guide.
+    pub(crate) fn can_follow(&self, before: LegId, after: LegId) -> bool {
+        let candidates = (self.graph.candidate(before), self.graph.candidate(after));
+        matches!(candidates, (Some(before), Some(after)) if self.hand_over_s(before, after).is_finite())
+    }
+
+    /// What the guided option called `id` costs before it is measured, seconds without surcharges.
+    pub(crate) fn priced_s(&self, id: LegId) -> Option<f64> {
+        self.price(id).map(|price| self.pricer.cost_s(price, None))
     }
 
     /// The options that could not be guided, with the reason.
@@ -203,9 +248,10 @@ impl<'a> Search<'a> {
         // The direct way serves no later problem; it is there to be compared with as it is.
         let is_bare = measured.is_some() || id == LegId::Direct;
         let surcharge_s = if is_bare { 0.0 } else { settings.untrained_surcharge_s };
-        let cost_s = match self.guided.get(&option.id()) {
+        let cost_s = match self.found(option.id()) {
             Some(Ok(_)) => {
-                let cost_s = self.pricer.cost_s(&self.prices[&option.id()], measured.as_ref());
+                let price = self.price(option.id()).expect("a guided option is priced");
+                let cost_s = self.pricer.cost_s(price, measured.as_ref());
                 cost_s.max(if measured.is_some() { least_s } else { unguided_s })
             }
             Some(Err(_)) => return f64::INFINITY,

@@ -11,14 +11,17 @@ use sharp_space::{Detection, RegionDetector, Seed};
 use thiserror::Error;
 
 use crate::abstraction::{Abstraction, AbstractionSettings, construct};
-use crate::algorithm::{Outcome, solve};
+use crate::algorithm::{Outcome, solve_with};
+use crate::building::{BuildingMonitor, BuildingWork, Part, Site, learn_hand_overs, learn_options};
 use crate::conditions::Conditions;
 use crate::files::FileError;
+use crate::known::KnownOptions;
 use crate::library::OptionLibrary;
 use crate::method::Method;
 use crate::plan_file::{AbstractionFile, Plan, map_hash};
 use crate::problem::PlanningProblem;
 use crate::query::{Monitor, Query};
+use crate::roster::{Area, Roster};
 
 /// A robot in a building that solves problem after problem and keeps what it learns.
 pub struct Sharp {
@@ -31,6 +34,8 @@ pub struct Sharp {
     conditions: Conditions,
     library: OptionLibrary,
     built: Option<Built>,
+    /// What the library knows here, and which version of it.
+    known: Option<(u64, Arc<KnownOptions>)>,
     seed: Seed,
 }
 
@@ -93,6 +98,7 @@ impl Sharp {
             conditions,
             library: OptionLibrary::in_memory(),
             built: None,
+            known: None,
             seed: Seed(1),
         }
     }
@@ -100,14 +106,14 @@ impl Sharp {
     /// The same with another method.
     #[must_use]
     pub fn with_method(self, method: Method) -> Self {
-        Self { method, ..self }
+        Self { method, known: None, ..self }
     }
 
     /// The same with options of `kind`, one of ours.
     #[must_use]
     pub fn with_options(self, kind: OptionKind) -> Self {
         match kind.family() {
-            Some(family) => Self { family: Arc::new(family), kind, built: None, ..self },
+            Some(family) => Self { family: Arc::new(family), kind, built: None, known: None, ..self },
             None => self,
         }
     }
@@ -115,26 +121,26 @@ impl Sharp {
     /// The same with options of a family from outside.
     #[must_use]
     pub fn with_family(self, family: Arc<dyn OptionFamily>) -> Self {
-        Self { family, kind: OptionKind::Custom, built: None, ..self }
+        Self { family, kind: OptionKind::Custom, built: None, known: None, ..self }
     }
 
     /// The same with states and options that are known already, which came from `source`.
     #[must_use]
     pub fn with_abstraction(self, abstraction: Abstraction, source: &str) -> Self {
         let built = Some(Built { abstraction, source: source.to_owned(), detection: None });
-        Self { built, ..self }
+        Self { built, known: None, ..self }
     }
 
     /// The same with other settings for building the abstraction.
     #[must_use]
     pub fn with_abstraction_settings(self, settings: AbstractionSettings) -> Self {
-        Self { settings, built: None, ..self }
+        Self { settings, built: None, known: None, ..self }
     }
 
     /// The same under another noise.
     #[must_use]
     pub fn with_noise(self, noise: NoiseModel) -> Self {
-        Self { conditions: Conditions { noise, ..self.conditions }, ..self }
+        Self { conditions: Conditions { noise, ..self.conditions }, known: None, ..self }
     }
 
     /// The same with policies learnt and verified in forks of `simulator`, which may be anybody's.
@@ -146,7 +152,7 @@ impl Sharp {
     /// The same with the options of `library`, which also keeps what is learnt.
     #[must_use]
     pub fn with_library(self, library: OptionLibrary) -> Self {
-        Self { library, ..self }
+        Self { library, known: None, ..self }
     }
 
     /// The same with another root of all randomness.
@@ -205,15 +211,52 @@ impl Sharp {
         Ok(AbstractionFile::new(map, source, self.kind, options, &*states))
     }
 
+    /// What the library knows of `abstraction`, made ready for searches; made again when the library has changed.
+    fn known(&mut self, abstraction: &Abstraction) -> Arc<KnownOptions> {
+        let Self { world, method, conditions, library, .. } = self;
+        let version = library.version();
+        let is_current = self.known.as_ref().is_some_and(|(made_of, _)| *made_of == version);
+        if !is_current {
+            let known = KnownOptions::new(world, abstraction, method, &conditions.noise, library);
+            self.known = Some((version, Arc::new(known)));
+        }
+        self.known.as_ref().map(|(_, known)| Arc::clone(known)).expect("just made")
+    }
+
+    /// Learns the part `part` of all options and hand-overs of the building, or of those `within` an area, that the library
+    /// lacks: first the options, and once all of them are there the hand-overs.
+    ///
+    /// # Errors
+    /// If the map has no room for the robot, or the library cannot be written.
+    pub fn learn_building(
+        &mut self,
+        (within, part): (Option<Area>, Part),
+        monitor: &dyn BuildingMonitor,
+    ) -> Result<(Roster, BuildingWork), SolveError> {
+        let abstraction = self.abstraction(&())?.clone();
+        let Self { world, method, conditions, library, seed, .. } = self;
+        let site = Site { world, abstraction: &abstraction, method, conditions, seed: *seed };
+        let roster = Roster::new(&site, within);
+        monitor.planned(roster.options.len(), roster.hand_overs.len());
+        let mut work = BuildingWork::default();
+        library.save_at_once()?;
+        learn_options((&site, &roster), library, part, monitor, &mut work)?;
+        if !monitor.should_stop() {
+            learn_hand_overs((&site, &roster), library, part, monitor, &mut work)?;
+        }
+        Ok((roster, work))
+    }
+
     /// Algorithm 1: a plan for `query`. What is learnt stays in the library.
     ///
     /// # Errors
     /// If the map has no room for the robot, or the library cannot be written.
     pub fn solve(&mut self, query: Query, monitor: &dyn Monitor) -> Result<Answer, SolveError> {
         let abstraction = self.abstraction(monitor)?.clone();
+        let known = self.known(&abstraction);
         let Self { world, method, conditions, library, seed, .. } = self;
         let problem = PlanningProblem { world, method, conditions, query, seed: *seed, monitor };
-        Ok(match solve(&problem, &abstraction, library)? {
+        Ok(match solve_with(&problem, &abstraction, library, &known)? {
             Outcome::Solved(solution) => Answer::Solved(Box::new(Plan {
                 world: world.clone(),
                 abstraction,

@@ -5,6 +5,7 @@ pub(crate) mod baseline;
 pub(crate) mod eval;
 pub(crate) mod export;
 pub(crate) mod jobs;
+pub(crate) mod learn;
 pub(crate) mod library;
 pub(crate) mod map;
 pub(crate) mod prior;

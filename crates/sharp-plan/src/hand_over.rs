@@ -1,0 +1,155 @@
+//! Hand-overs: what driving from the middle of one option to the middle of the next shows.
+//!
+//! The success of a plan is no product of the successes of its options: how an option is entered matters, and so does
+//! where its guide comes from once the guides of the plan are joined. Half-way along an option both are forgotten.
+//! So a plan is cut in the middle of each option, and each piece between two cuts is measured as a plan would drive
+//! it: with the joined guides of the pair, by robots that have driven the first half of the first option.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use sharp_drive::{
+    ChainRun, Driver, EpisodeEnd, InitialStates, OptionPolicy, StateSpread, SuccessCount, SuccessEstimate, World,
+};
+use sharp_guide::{GuidedOption, join_guides};
+use sharp_options::OptionId;
+use sharp_space::Seed;
+
+use crate::conditions::Conditions;
+use crate::files;
+use crate::method::Method;
+
+/// Runs of a hand-over, at least and at most: counting ends when the 95 % interval is as narrow as for 256 successes.
+const EPISODES: (u32, u32) = (256, 1024);
+/// Half the width of the interval at which counting ends.
+const HALF_WIDTH: f64 = 0.0075;
+/// States in which the first option of a hand-over begins.
+const STATE_POOL: usize = 64;
+/// How they spread: as robots arrive there. They have half an option left to get onto the guide.
+pub(crate) const ARRIVING: StateSpread = 
+    StateSpread { radius_m: 0.15, heading_sd_rad: 0.15, speed_max_mps: 0.6 };
+/// Raised whenever hand-overs are measured in another way.
+const RULE: u32 = 1;
+
+/// What driving from the middle of one option to the middle of the next showed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HandOver {
+    /// The first option.
+    pub before: OptionId,
+    /// The second one.
+    pub after: OptionId,
+    /// The hash of all that was driven: guides, what lies around them, and policies.
+    pub key: String,
+    /// Robots that came to the middle of the first option, and those of them that came to the middle of the second.
+    pub count: SuccessCount,
+    /// Mean time between the two, seconds; infinite if none arrived.
+    pub mean_time_s: f64,
+}
+
+/// A hash of what decides how an option is driven: its corridor and its policy.
+pub(crate) fn identity(corridor: &str, policy: &OptionPolicy) -> String {
+    let policy = match policy {
+        OptionPolicy::Network(network) => format!("{:?} {}", network.interface, weights_hash(network)),
+        other => format!("{other:?}"),
+    };
+    files::hash(format!("{corridor} {policy}").as_bytes())
+}
+
+fn weights_hash(network: &sharp_drive::NetworkPolicy) -> String {
+    use std::collections::BTreeMap;
+    files::hash(&network.actor.to_bytes(&BTreeMap::new()))
+}
+
+/// The key of the hand-over between two options with these identities.
+pub(crate) fn pair_key(before: &str, after: &str) -> String {
+    files::hash(format!("{RULE} {before} {after}").as_bytes())[..32].to_owned()
+}
+
+/// An option with the policy that drives it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Driven<'a> {
+    pub(crate) option: &'a Arc<GuidedOption>,
+    pub(crate) policy: &'a OptionPolicy,
+}
+
+/// Drives from the middle of `before` to the middle of `after`.
+pub(crate) fn drive_hand_over(
+    (world, conditions, method): (&World, &Conditions, &Method),
+    (before, after): (Driven<'_>, Driven<'_>),
+    seed: Seed,
+) -> SuccessEstimate {
+    let mut pair = vec![Arc::clone(before.option), Arc::clone(after.option)];
+    if method.join_guides {
+        let start = before.option.guide.start();
+        pair = join_guides(pair, start, &world.guide_robot(), &method.search.guide);
+    }
+    let states = InitialStates::spread(world, &pair[0], &ARRIVING, STATE_POOL, seed);
+    let stretch = Stretch { options: &pair, policies: &[before.policy, after.policy], ends: [Cut::Middle; 2] };
+    stretch.drive((world, conditions), &states, Budget { episodes: EPISODES, half_width: HALF_WIDTH }, seed)
+}
+
+/// Where a stretch of a plan begins or ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cut {
+    /// Where its first option begins or its last one ends.
+    End,
+    /// In the middle of that option.
+    Middle,
+}
+
+/// How many runs a stretch is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Budget {
+    /// At least and at most.
+    pub(crate) episodes: (u32, u32),
+    /// Half the width of the 95 % interval at which counting ends between the two.
+    pub(crate) half_width: f64,
+}
+
+/// Consecutive legs of a plan, joined already, from one cut to another.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stretch<'a> {
+    pub(crate) options: &'a [Arc<GuidedOption>],
+    pub(crate) policies: &'a [&'a OptionPolicy],
+    pub(crate) ends: [Cut; 2],
+}
+
+impl Stretch<'_> {
+    /// How often robots that come to its first cut come to its second one, and how long they take between them.
+    /// They begin in `states` of the first leg.
+    pub(crate) fn drive(
+        &self,
+        (world, conditions): (&World, &Conditions),
+        states: &InitialStates,
+        budget: Budget,
+        seed: Seed,
+    ) -> SuccessEstimate {
+        let legs = self.options.iter().zip(self.policies).enumerate();
+        let mut drivers: Vec<Driver<'_>> =
+            legs.map(|(i, (option, policy))| Driver::new(option, policy, self.options.get(i + 1))).collect();
+        if let (Cut::Middle, Some(last)) = (self.ends[1], drivers.last_mut()) {
+            last.link.until_m = 0.5 * last.link.option.guide.length_m();
+        }
+        let (least, most) = budget.episodes;
+        let is_enough = |runs: &[ChainRun]| {
+            let count = self.count(runs).count;
+            runs.len() >= least as usize && count.half_width95() <= budget.half_width
+        };
+        let trial = conditions.monte_carlo(world).with_episodes(most).with_seed(seed);
+        self.count(&trial.runs_from(&drivers, states, is_enough))
+    }
+
+    fn count(&self, runs: &[ChainRun]) -> SuccessEstimate {
+        let ends = runs.iter().filter_map(|run| {
+            let visit = run.visits.first()?;
+            let before_s = match self.ends[0] {
+                Cut::End => 0.0,
+                // An option may end before its middle where its termination set is near.
+                Cut::Middle => visit.half_s.or_else(|| run.passed(0).then_some(visit.time_s))?,
+            };
+            Some((run.end == EpisodeEnd::Reached, run.time_s() - before_s))
+        });
+        SuccessEstimate::of(ends.collect::<Vec<_>>().into_iter())
+    }
+}
