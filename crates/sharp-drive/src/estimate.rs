@@ -38,6 +38,21 @@ impl SuccessEstimate {
         Self { count, mean_time_s }
     }
 
+    /// The estimate of all episodes of both.
+    #[must_use]
+    pub fn and(&self, other: &Self) -> Self {
+        let total_s = |of: &Self| if of.count.successes == 0 { 0.0 } else { f64::from(of.count.successes) * of.mean_time_s };
+        let count = SuccessCount {
+            episodes: self.count.episodes + other.count.episodes,
+            successes: self.count.successes + other.count.successes,
+        };
+        let mean_time_s = match count.successes {
+            0 => f64::INFINITY,
+            successes => (total_s(self) + total_s(other)) / f64::from(successes),
+        };
+        Self { count, mean_time_s }
+    }
+
     /// The expected cost of a use, seconds: mean time per success, and `failure_cost_s` for each failure.
     #[must_use]
     pub fn cost_s(&self, failure_cost_s: f64) -> f64 {

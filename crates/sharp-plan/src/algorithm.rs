@@ -27,6 +27,8 @@ use crate::verify::{PlannedOption, Solution, predict, verify};
 const ATTEMPTS_MAX: usize = 24;
 /// Plans run from end to end before the best of them is taken.
 const VERIFIED_MAX: usize = 4;
+/// The same where odds are composed.
+const COMPOSED_MAX: usize = 3;
 
 /// How solving ended.
 #[derive(Debug)]
@@ -64,6 +66,14 @@ pub(crate) fn solve_with(
     known: &Arc<KnownOptions>,
 ) -> Result<Outcome, FileError> {
     let outcome = algorithm_1(problem, abstraction, library, known);
+    let patient = problem.method.patient();
+    let outcome = match (outcome, &patient) {
+        // What quick guides cannot reach may be reached by manoeuvring.
+        (Ok(Outcome::NoPlan(_)), Some(method)) => {
+            algorithm_1(&PlanningProblem { method, ..*problem }, abstraction, library, known)
+        }
+        (outcome, _) => outcome,
+    };
     problem.monitor.phase(Phase::Done);
     outcome
 }
@@ -107,20 +117,23 @@ fn algorithm_1(
             let other = cheapest(problem, search, policies).filter(|(_, other)| names(other) != names(&p));
             other.map_or(f64::INFINITY, |(seconds, _)| seconds)
         };
-        if has_weak_option(problem, &p, &policies) && other_s(&mut search, &policies).is_finite() {
+        let is_composed = method.verify_episodes == 0;
+        if !is_composed && has_weak_option(problem, &p, &policies) && other_s(&mut search, &policies).is_finite() {
             continue;
         }
         // Beyond the paper: Pi is repaired and measured, and the search looks again while another plan seems cheaper.
         monitor.phase(Phase::Verify);
-        let is_composed = method.verify_episodes == 0;
         let is_stopped =
             !is_composed && !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)?;
         let solution = match is_composed {
-            true => predict(problem, &p, &policies, known),
+            true => predict(problem, &p, &mut policies, known),
             false => verify(problem, &p, &policies),
         };
         verified += 1;
-        search.offer_direct();
+        // Answers at once leave the direct way, which takes long to guide and to drive, for where there is no other.
+        if !is_composed {
+            search.offer_direct();
+        }
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
         let cost_s = |solution: &Solution| solution.cost_s(method.failure_cost_s);
         if best.as_ref().is_none_or(|best| cost_s(&solution) < cost_s(best)) {
@@ -128,7 +141,7 @@ fn algorithm_1(
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
         if is_stopped
-            || verified == VERIFIED_MAX
+            || verified == if is_composed { COMPOSED_MAX } else { VERIFIED_MAX }
             || best_s <= method.retry_above * other_s(&mut search, &policies)
         {
             break;

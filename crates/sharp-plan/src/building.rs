@@ -16,7 +16,7 @@ use sharp_space::Seed;
 use crate::abstraction::Abstraction;
 use crate::conditions::Conditions;
 use crate::files::FileError;
-use crate::hand_over::{Driven, HandOver, drive_hand_over, identity, pair_key};
+use crate::hand_over::{Driven, HandOver, chain_key, drive_hand_over, identity};
 use crate::learn::{LearnFailure, LearningTask, LearntPolicy};
 use crate::library::{OptionLibrary, StoredOption};
 use crate::method::Method;
@@ -214,36 +214,29 @@ pub fn learn_hand_overs(
     for (unit, block) in roster.hand_overs.chunks(BLOCK).enumerate() {
         let kept = library.read_block(&roster.fingerprint, unit)?;
         let kept: BTreeMap<String, HandOver> = kept.into_iter().map(|one| (one.key.clone(), one)).collect();
-        let wanted: Vec<Option<(&(usize, usize), String)>> = block
-            .iter()
-            .map(|pair| {
-                let (before, after) = (identities[pair.0].as_ref()?, identities[pair.1].as_ref()?);
-                Some((pair, pair_key(before, after)))
-            })
-            .collect();
+        let wanted: Vec<Option<Wanted>> =
+            block.iter().map(|&(before, after)| Wanted::new(roster, &identities, before, after)).collect();
         let find = |key: &String| kept.get(key).or_else(|| known.get(key));
-        let is_known = wanted.iter().all(|one| one.as_ref().is_some_and(|(_, key)| find(key).is_some()));
+        let is_known = wanted.iter().all(|one| one.as_ref().is_some_and(|one| find(&one.key).is_some()));
         if !part.has(unit) && !is_known || monitor.should_stop() {
             is_whole = false;
             continue;
         }
         let shared = &*library;
-        let drive = |one: &Option<(&(usize, usize), String)>| -> Option<(bool, HandOver)> {
-            let (pair, key) = one.as_ref()?;
-            let (before, after) = **pair;
-            let ids = [before, after].map(|position| roster.options[position].id);
+        let drive = |one: &Option<Wanted>| -> Option<(bool, HandOver)> {
+            let Wanted { chain, key } = one.as_ref()?;
             if let Some(found) = find(key) {
-                return Some((false, HandOver { before: ids[0], after: ids[1], ..found.clone() }));
+                return Some((false, named(roster, chain, found.clone())));
             }
-            let driven = |position: usize| {
+            let driven = |&position: &usize| {
                 let RosterOption { id, option, .. } = &roster.options[position];
                 Some(Driven { option, policy: &shared.get(*id)?.learnt.policy })
             };
+            let driven = chain.iter().map(driven).collect::<Option<Vec<_>>>()?;
             let Site { world, method, conditions, seed, .. } = *site;
             let seed = seed.child(&format!("hand-over {key}"), 0);
-            let estimate = drive_hand_over((world, conditions, method), (driven(before)?, driven(after)?), seed);
-            let (count, mean_time_s) = (estimate.count, estimate.mean_time_s);
-            Some((true, HandOver { before: ids[0], after: ids[1], key: key.clone(), count, mean_time_s }))
+            let estimate = drive_hand_over((world, conditions, method), &driven, seed);
+            Some((true, named(roster, chain, HandOver::new(key.clone(), estimate))))
         };
         let done: Vec<Option<(bool, HandOver)>> = wanted.par_iter().map(drive).collect();
         is_whole &= done.iter().all(Option::is_some);
@@ -282,6 +275,31 @@ impl Building {
         self.unguided.extend(before.unguided.iter().filter(|id| !self.unguided.contains(id)).collect::<Vec<_>>());
         self
     }
+}
+
+/// A hand-over that is to be known.
+struct Wanted {
+    /// Positions in the roster, in the order of driving: the run-up, the first option, the second one.
+    chain: Vec<usize>,
+    key: String,
+}
+
+impl Wanted {
+    /// `None` while one of the options is not learnt.
+    fn new(roster: &Roster, identities: &[Option<String>], before: usize, after: usize) -> Option<Self> {
+        let mut chain = roster.options[before].run_up.clone();
+        chain.extend([before, after]);
+        let identities = chain.iter().map(|&position| identities[position].as_deref());
+        let key = chain_key(&identities.collect::<Option<Vec<_>>>()?);
+        Some(Self { chain, key })
+    }
+}
+
+/// `hand_over` with the names that the options of `chain` have in this building.
+fn named(roster: &Roster, chain: &[usize], hand_over: HandOver) -> HandOver {
+    let ids: Vec<OptionId> = chain.iter().map(|&position| roster.options[position].id).collect();
+    let (run_up, pair) = ids.split_at(ids.len() - 2);
+    HandOver { before: pair[0], after: pair[1], run_up: run_up.to_vec(), ..hand_over }
 }
 
 fn known_identity(library: &OptionLibrary, option: &RosterOption) -> Option<String> {

@@ -11,7 +11,7 @@ use sharp_sim::NoiseModel;
 use sharp_space::Point;
 
 use crate::abstraction::Abstraction;
-use crate::hand_over::{HandOver, identity, pair_key};
+use crate::hand_over::{HandOver, chain_key, identity};
 use crate::library::OptionLibrary;
 use crate::method::Method;
 use crate::price::{Price, Pricer};
@@ -57,9 +57,10 @@ impl KnownOptions {
         this.unguided = unguided.into_iter().flatten().map(|&id| (LegId::Option(id), NoGuide::Unreachable)).collect();
         let identities: BTreeMap<OptionId, String> =
             stored.iter().map(|&(id, stored)| (id, identity(&stored.corridor, &stored.learnt.policy))).collect();
-        for HandOver { before, after, key, count, mean_time_s } in library.hand_overs() {
-            let Some(identities) = identities.get(before).zip(identities.get(after)) else { continue };
-            if *key == pair_key(identities.0, identities.1) {
+        for HandOver { before, after, run_up, key, count, mean_time_s } in library.hand_overs() {
+            let chain = run_up.iter().chain([before, after]).map(|id| identities.get(id).map(String::as_str));
+            let is_current = chain.collect::<Option<Vec<_>>>().is_some_and(|chain| *key == chain_key(&chain));
+            if is_current {
                 let estimate = SuccessEstimate { count: *count, mean_time_s: *mean_time_s };
                 this.hand_overs.insert((*before, *after), estimate);
             }

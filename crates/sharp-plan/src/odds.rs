@@ -8,22 +8,26 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sharp_drive::{InitialStates, SuccessCount, SuccessEstimate, wilson95};
-use sharp_guide::{GuidedOption, LegId, Role};
+use sharp_drive::{InitialStates, StateSpread, SuccessCount, SuccessEstimate, wilson95};
+use sharp_guide::{GuidePath, GuidedOption, LegId, Role};
 use sharp_sim::RobotState;
 
-use crate::hand_over::{ARRIVING, Budget, Cut, Stretch};
+use crate::hand_over::{Budget, RUN_UP_M, Stretch};
 use crate::known::KnownOptions;
 use crate::policies::Policies;
 use crate::price::Pricer;
 use crate::problem::PlanningProblem;
 
-/// Runs of a first or last piece.
-const END_EPISODES: u32 = 32;
-/// Runs of a hand-over that nobody has driven yet.
-const NEW_EPISODES: u32 = 128;
+/// Runs of a piece that no library has: first so many, and where one of them fails up to so many more.
+const EPISODES: (u32, u32) = (32, 128);
+/// Half the width of the 95 % interval at which these end.
+const HALF_WIDTH: f64 = 0.03;
+/// Runs that the cost model's word counts as beside them: it knows little of places where a robot barely fits.
+const PRICE_EPISODES: f64 = 16.0;
 /// States in which the option before a last leg begins.
-const STATE_POOL: usize = 16;
+const STATE_POOL: usize = 8;
+/// How they spread: as robots pass there.
+const PASSING: StateSpread = StateSpread { radius_m: 0.08, heading_sd_rad: 0.08, speed_max_mps: 0.6 };
 /// Successes that tell a mean time.
 const TIMED_MIN: u32 = 8;
 
@@ -49,6 +53,8 @@ pub struct ComposedOdds {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Piece {
+    /// Where it ends, in legs from the start of the plan: 2.5 is the middle of the third leg.
+    pub until: f64,
     /// The chance to come through.
     pub success: f64,
     /// Runs that it was counted on; the cost model's word counts as some.
@@ -79,35 +85,34 @@ impl ComposedOdds {
     /// The nearest count of whole runs.
     #[must_use]
     pub fn count(&self) -> SuccessCount {
-        let episodes = self.episodes.round().max(1.0) as u32;
-        SuccessCount { episodes, successes: (self.success * f64::from(episodes)).round() as u32 }
+        nearest_count(self.success, self.episodes)
     }
 
-    /// The chance of success and the time, seconds, of what is left of a plan with `options` legs from `first_leg` on, of whose
-    /// guide the robot has driven `share`.
+    /// The chance of success and the time, seconds, of what is left for a robot that has driven `share` of leg number `leg`.
     #[must_use]
-    pub fn rest(&self, legs: &[LegId], (leg, share): (usize, f64)) -> (f64, f64) {
-        // In pieces: a leg that is an option spans the second half of one piece and the first half of the next.
-        let is_option = |index: usize| legs.get(index).is_some_and(|leg| leg.role() == Role::Option);
-        let cuts_before = (0..leg).filter(|&index| is_option(index)).count();
-        let is_past = is_option(leg) && share >= 0.5;
-        let piece = (cuts_before + usize::from(is_past)).min(self.pieces.len().saturating_sub(1));
-        let first = legs.first().is_some_and(|leg| leg.role() != Role::Option);
-        let done = match (is_option(leg), is_past) {
-            (true, true) => share - 0.5,
-            (true, false) if leg == 1 && first => 0.6 + 0.8 * share,
-            (true, false) => 0.5 + share,
-            (false, _) if leg == 0 && legs.len() == 1 => share,
-            (false, _) if leg == 0 => 0.6 * share,
-            (false, _) => 0.4 + 0.6 * share,
-        };
-        let left = (1.0 - done).clamp(0.0, 1.0);
-        let rest = self.pieces.iter().skip(piece).enumerate().map(|(index, piece)| {
-            let share = if index == 0 { left } else { 1.0 };
-            (libm::pow(piece.success, share), share * piece.time_s)
-        });
-        rest.fold((1.0, 0.0), |(success, time_s), (p, t)| (success * p, time_s + t))
+    pub fn rest(&self, (leg, share): (usize, f64)) -> (f64, f64) {
+        let at = leg as f64 + share;
+        let mut begin = 0.0;
+        let mut rest = (1.0, 0.0);
+        for piece in &self.pieces {
+            let left = ((piece.until - at.max(begin)) / (piece.until - begin)).clamp(0.0, 1.0);
+            rest = (rest.0 * libm::pow(piece.success, left), rest.1 + left * piece.time_s);
+            begin = piece.until;
+        }
+        rest
     }
+}
+
+impl Piece {
+    /// The nearest count of whole runs.
+    pub(crate) fn count(&self) -> SuccessCount {
+        nearest_count(self.success, self.episodes)
+    }
+}
+
+fn nearest_count(success: f64, episodes: f64) -> SuccessCount {
+    let episodes = episodes.round().max(1.0) as u32;
+    SuccessCount { episodes, successes: (success * f64::from(episodes)).round() as u32 }
 }
 
 /// The odds of `plan`, whose guides are joined already, with `policies`.
@@ -117,70 +122,127 @@ pub(crate) fn compose(
     policies: &Policies<'_>,
     known: &KnownOptions,
 ) -> ComposedOdds {
-    let options: Vec<usize> = (0..plan.len()).filter(|&index| plan[index].id.role() == Role::Option).collect();
-    let (Some(&first), Some(&last)) = (options.first(), options.last()) else {
-        return ComposedOdds::of(vec![end_piece(problem, plan, policies, [Cut::End; 2])]);
+    let whole = plan.len();
+    let options: Vec<usize> = (0..whole).filter(|&index| plan[index].id.role() == Role::Option).collect();
+    let (Some(first), Some(&last)) = (first_cut(plan, &options), options.last()) else {
+        return ComposedOdds::of(vec![end_piece(problem, plan, policies, (None, whole))]);
     };
-    let mut pieces = vec![end_piece(problem, &plan[..=first], policies, [Cut::End, Cut::Middle])];
-    for pair in plan[first..=last].windows(2) {
-        let known = match (pair[0].id, pair[1].id) {
-            (LegId::Option(before), LegId::Option(after)) => known.hand_over(before, after).copied(),
+    let mut pieces = vec![end_piece(problem, plan, policies, (None, first))];
+    for cut in first..last {
+        let known = match (plan[cut].id, plan[cut + 1].id) {
+            (LegId::Option(before), LegId::Option(after)) => known.hand_over(before, after),
             _ => None,
         };
-        let driven = || drive(problem, pair, policies, [Cut::Middle; 2], NEW_EPISODES);
-        let SuccessEstimate { count, mean_time_s } = known.unwrap_or_else(driven);
-        let time_s = if mean_time_s.is_finite() { mean_time_s } else { priced(problem, pair, [Cut::Middle; 2]).0 };
-        pieces.push(Piece { success: count.rate(), episodes: f64::from(count.episodes.max(1)), time_s });
+        pieces.push(match known {
+            Some(SuccessEstimate { count, mean_time_s }) if count.successes > 0 => Piece {
+                until: cut as f64 + 1.5,
+                success: count.rate(),
+                episodes: f64::from(count.episodes),
+                time_s: *mean_time_s,
+            },
+            _ => end_piece(problem, plan, policies, (Some(cut), cut + 1)),
+        });
     }
-    pieces.push(end_piece(problem, &plan[last..], policies, [Cut::Middle, Cut::End]));
+    pieces.push(end_piece(problem, plan, policies, (Some(last), whole)));
     ComposedOdds::of(pieces)
 }
 
-/// A piece that no other plan has: driven a few times, beside its price.
+/// The option in whose middle a robot has left the first leg some metres behind, so that it does not matter any more.
+fn first_cut(plan: &[Arc<GuidedOption>], options: &[usize]) -> Option<usize> {
+    let mut way_m = 0.0;
+    for &index in options {
+        let length_m = plan[index].guide.length_m();
+        if way_m + 0.5 * length_m >= RUN_UP_M {
+            return Some(index);
+        }
+        way_m += length_m;
+    }
+    options.last().copied()
+}
+
+/// The piece of `plan` from the middle of leg `from`, or from the start, to the middle of leg `to`, or to the goal where there
+/// is no such leg: driven a few times, beside its price.
 fn end_piece(
     problem: &PlanningProblem<'_>,
-    legs: &[Arc<GuidedOption>],
+    plan: &[Arc<GuidedOption>],
     policies: &Policies<'_>,
-    ends: [Cut; 2],
+    (from, to): (Option<usize>, usize),
 ) -> Piece {
-    let SuccessEstimate { count, mean_time_s } = drive(problem, legs, policies, ends, END_EPISODES);
-    let (priced_s, success) = priced(problem, legs, ends);
-    let weight = problem.method.search.price_episodes;
-    let episodes = weight + f64::from(count.episodes);
-    let success = (weight * success + f64::from(count.successes)) / episodes;
+    let SuccessEstimate { count, mean_time_s } = drive(problem, plan, policies, (from, to));
+    let (priced_s, success) = priced(problem, plan, (from, to));
+    let episodes = PRICE_EPISODES + f64::from(count.episodes);
+    let success = (PRICE_EPISODES * success + f64::from(count.successes)) / episodes;
     let time_s = if count.successes >= TIMED_MIN { mean_time_s } else { priced_s };
-    Piece { success, episodes, time_s }
+    let until = if to < plan.len() { to as f64 + 0.5 } else { to as f64 };
+    Piece { until, success, episodes, time_s }
 }
 
-/// Drives `legs`, which are a part of a plan.
+/// Drives a piece of `plan`, with a run-up.
 fn drive(
     problem: &PlanningProblem<'_>,
-    legs: &[Arc<GuidedOption>],
+    plan: &[Arc<GuidedOption>],
     policies: &Policies<'_>,
-    ends: [Cut; 2],
-    episodes: u32,
+    (from, to): (Option<usize>, usize),
 ) -> SuccessEstimate {
     let PlanningProblem { world, conditions, query, .. } = *problem;
-    let names: Vec<String> = legs.iter().map(|leg| leg.id.to_string()).collect();
+    let begin = from.map_or(0, |cut| run_up(plan, cut));
+    let mut options = plan[begin..plan.len().min(to + 1)].to_vec();
+    let names: Vec<String> = options.iter().map(|leg| leg.id.to_string()).collect();
     let seed = problem.seed.child(&format!("odds {}", names.join(" ")), 0);
-    let states = match ends[0] {
-        Cut::End => InitialStates::exactly(RobotState::at_rest(query.start)),
-        Cut::Middle => InitialStates::spread(world, &legs[0], &ARRIVING, STATE_POOL, seed),
+    let states = if begin == 0 {
+        InitialStates::exactly(RobotState::at_rest(query.start))
+    } else {
+        options[0] = from_run_up(&options[0], from.map_or(0.0, |cut| way_m(plan, begin, cut)));
+        InitialStates::spread(world, &options[0], &PASSING, STATE_POOL, seed)
     };
-    let policies: Vec<_> = legs.iter().map(|leg| &policies.learnt(leg.id).policy).collect();
-    let budget = Budget { episodes: (episodes, episodes), half_width: 0.0 };
-    Stretch { options: legs, policies: &policies, ends }.drive((world, conditions), &states, budget, seed)
+    let policies: Vec<_> = options.iter().map(|leg| &policies.learnt(leg.id).policy).collect();
+    let (from_middle_of, to_middle) = (from.map(|cut| cut - begin), to < plan.len());
+    let stretch = Stretch { options: &options, policies: &policies, from_middle_of, to_middle };
+    let some = Budget { episodes: (EPISODES.0, EPISODES.0), half_width: 0.0 };
+    let some = stretch.drive((world, conditions), &states, some, seed);
+    if some.count.failures() == 0 {
+        return some;
+    }
+    let more = Budget { episodes: (1, EPISODES.1), half_width: HALF_WIDTH };
+    stretch.drive((world, conditions), &states, more, seed.child("more", 0)).and(&some)
 }
 
-/// Time, seconds, and success of `legs` by their price; of a leg that is cut the half.
-fn priced(problem: &PlanningProblem<'_>, legs: &[Arc<GuidedOption>], ends: [Cut; 2]) -> (f64, f64) {
+/// The way from the beginning of leg `begin` to the middle of leg `cut`, metres.
+fn way_m(plan: &[Arc<GuidedOption>], begin: usize, cut: usize) -> f64 {
+    let length_m = |leg: &Arc<GuidedOption>| leg.guide.length_m();
+    plan[begin..cut].iter().map(length_m).sum::<f64>() + 0.5 * length_m(&plan[cut])
+}
+
+/// The last leg from which robots have enough way to the middle of leg `cut`.
+fn run_up(plan: &[Arc<GuidedOption>], cut: usize) -> usize {
+    (0..=cut).rev().find(|&begin| way_m(plan, begin, cut) >= RUN_UP_M).unwrap_or(0)
+}
+
+/// `option` without the part of its guide by which `way_m` is longer than a run-up.
+fn from_run_up(option: &Arc<GuidedOption>, way_m: f64) -> Arc<GuidedOption> {
+    let guide = &option.guide;
+    let skipped_m = (way_m - RUN_UP_M).max(0.0);
+    let kept = (0..guide.poses().len()).filter(|&index| guide.arc_m(index) >= skipped_m);
+    match GuidePath::new(kept.map(|index| guide.poses()[index]).collect(), guide.spacing_m()) {
+        Ok(guide) => Arc::new(GuidedOption { guide, ..GuidedOption::clone(option) }),
+        // Less than two poses are left: it is driven whole.
+        Err(_) => Arc::clone(option),
+    }
+}
+
+/// Time, seconds, and success of a piece by its price; of a leg that is cut the half.
+fn priced(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    (from, to): (Option<usize>, usize),
+) -> (f64, f64) {
     let PlanningProblem { world, method, conditions, .. } = *problem;
     let pricer = Pricer::new(world, &conditions.noise, method.search, method.failure_cost_s);
     let mut whole = (0.0, 1.0);
-    for (index, leg) in legs.iter().enumerate() {
-        let next = legs.get(index + 1).map(|next| &next.guide);
+    for index in from.unwrap_or(0)..plan.len().min(to + 1) {
+        let (leg, next) = (&plan[index], plan.get(index + 1).map(|next| &next.guide));
         let (time_s, success) = pricer.price(leg.id, &leg.guide, next).parts();
-        let is_cut = index == 0 && ends[0] == Cut::Middle || index + 1 == legs.len() && ends[1] == Cut::Middle;
+        let is_cut = from == Some(index) || to == index;
         let share = if is_cut { 0.5 } else { 1.0 };
         whole = (whole.0 + share * time_s, whole.1 * libm::pow(success, share));
     }
@@ -192,7 +254,7 @@ mod tests {
     use super::*;
 
     fn piece(success: f64, episodes: f64) -> Piece {
-        Piece { success, episodes, time_s: 5.0 }
+        Piece { until: 1.0, success, episodes, time_s: 5.0 }
     }
 
     #[test]
@@ -205,5 +267,15 @@ mod tests {
         let sure = ComposedOdds::of(vec![piece(1.0, 256.0), piece(1.0, 1024.0)]);
         assert_eq!((sure.success, sure.episodes), (1.0, 256.0), "no better known than its weakest piece");
         assert!(sure.lower95 < 0.99, "{sure:?}");
+    }
+
+    #[test]
+    fn what_is_left_shrinks_from_the_whole_to_nothing() {
+        let pieces = [1.5, 2.5, 4.0].map(|until| Piece { until, ..piece(0.9, 100.0) });
+        let odds = ComposedOdds::of(pieces.to_vec());
+        assert_eq!(odds.rest((0, 0.0)), (odds.success, odds.time_s), "all of it");
+        let half_way = odds.rest((1, 0.5));
+        assert!((half_way.0 - 0.81).abs() < 1e-12 && (half_way.1 - 10.0).abs() < 1e-12, "{half_way:?}");
+        assert_eq!(odds.rest((3, 1.0)), (1.0, 0.0), "nothing");
     }
 }

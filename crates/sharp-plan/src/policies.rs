@@ -1,5 +1,6 @@
 //! The policies at hand while a problem is solved: from the library, or learnt now.
 
+use sharp_drive::SuccessEstimate;
 use sharp_guide::{GuidedOption, LegId, Role};
 use sharp_space::OccupancyGrid;
 use std::collections::{BTreeMap, BTreeSet};
@@ -40,6 +41,13 @@ impl<'a> Policies<'a> {
     /// Whether the policy of the option existed before this problem.
     pub(crate) fn is_reused(&self, id: LegId) -> bool {
         id.role() == Role::Option && !self.fresh.contains(&id)
+    }
+
+    /// Notes what was seen of the leg called `id` in this problem.
+    pub(crate) fn note(&mut self, id: LegId, estimate: SuccessEstimate) {
+        if let Some(learnt) = self.learnt.get_mut(&id) {
+            learnt.estimate = estimate;
+        }
     }
 
     /// Takes the policy of `option` from another map of the library where its corridor is the same.

@@ -12,6 +12,7 @@ use sharp_space::{Point, Pose};
 use crate::abstraction::Abstraction;
 use crate::building::Site;
 use crate::files;
+use crate::hand_over::{RUN_UP_M, RUN_UP_MAX};
 use crate::policies::corridor;
 use crate::query::Query;
 use crate::search::Search;
@@ -44,6 +45,8 @@ pub struct RosterOption {
     pub corridor: String,
     /// Shortest ways between two options of the building that lead through it.
     pub uses: u64,
+    /// Options from which robots come to its middle in measurements, in order, as positions in the roster.
+    pub(crate) run_up: Vec<usize>,
 }
 
 /// All options of a building that can be guided, the most used first, and all hand-overs between them.
@@ -147,17 +150,48 @@ fn ordered(
     order.sort_by_key(|&position| (Reverse(uses[position]), guided[position]));
     let mut rank = vec![0; guided.len()];
     order.iter().enumerate().for_each(|(new, &old)| rank[old] = new);
+    let guide = |position: usize| &search.option(LegId::Option(guided[position])).expect("it was guided").guide;
+    let lengths_m: Vec<f64> = (0..guided.len()).map(|position| guide(position).length_m()).collect();
+    let turn = |before: usize, after: usize| guide(before).end().heading.turn_to(guide(after).start().heading).abs();
+    let before = straightest(&next, turn);
     let entry = |&position: &usize| {
         let id = guided[position];
         let option = search.found(LegId::Option(id)).and_then(Result::ok).expect("it was guided");
         let corridor = corridor(option, &site.world.grid);
-        RosterOption { id, option: Arc::clone(option), corridor, uses: uses[position] }
+        let run_up = run_up(&before, &lengths_m, position).into_iter().map(|old| rank[old]).collect();
+        RosterOption { id, option: Arc::clone(option), corridor, uses: uses[position], run_up }
     };
     let hand_overs =
         order.iter().enumerate().flat_map(|(new, &old)| next[old].iter().map(move |&after| (new, after)));
     let mut hand_overs: Vec<(usize, usize)> = hand_overs.map(|(before, after)| (before, rank[after])).collect();
     hand_overs.sort_unstable();
     Roster { fingerprint, options: order.iter().map(entry).collect(), unguided, hand_overs }
+}
+
+/// For each option the one before it that leads on most straight; `turn(before, after)` is the angle between their guides.
+/// It depends on the options nearby alone, so that a change of the map far away changes nothing.
+fn straightest(next: &[Vec<usize>], turn: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
+    let mut best: Vec<Option<(f64, usize)>> = vec![None; next.len()];
+    for (before, after) in next.iter().enumerate().flat_map(|(before, next)| next.iter().map(move |&after| (before, after))) {
+        let angle = turn(before, after);
+        if best[after].is_none_or(|(least, _)| angle < least) {
+            best[after] = Some((angle, before));
+        }
+    }
+    best.into_iter().map(|best| best.map(|(_, before)| before)).collect()
+}
+
+/// The options that robots drive before option number `of`, until they have some metres behind them in its middle.
+fn run_up(before: &[Option<usize>], lengths_m: &[f64], of: usize) -> Vec<usize> {
+    let (mut chain, mut way_m, mut at) = (Vec::new(), 0.5 * lengths_m[of], of);
+    while way_m < RUN_UP_M && chain.len() < RUN_UP_MAX {
+        let Some(previous) = before[at].filter(|previous| *previous != of && !chain.contains(previous)) else { break };
+        chain.push(previous);
+        way_m += lengths_m[previous];
+        at = previous;
+    }
+    chain.reverse();
+    chain
 }
 
 /// How many shortest ways from one option to another lead through each, its ends included.
@@ -207,6 +241,14 @@ fn shortest_ways(next: &[Vec<usize>], costs_s: &[f64], source: usize) -> (Vec<us
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn short_options_are_reached_over_those_before_them() {
+        let before = [None, Some(0), Some(1), Some(2)];
+        let lengths_m = [3.0, 1.2, 0.4, 5.0];
+        let chains = [0, 1, 2, 3].map(|of| run_up(&before, &lengths_m, of));
+        assert_eq!(chains, [vec![], vec![0], vec![0, 1], vec![]]);
+    }
 
     #[test]
     fn what_lies_between_others_is_used_most() {

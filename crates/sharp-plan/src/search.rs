@@ -241,7 +241,7 @@ impl<'a> Search<'a> {
         let least_s = option.straight_m() / top_mps;
         let unguided_s = match settings.price {
             PriceRule::Length => least_s / settings.nominal_speed,
-            PriceRule::Profile | PriceRule::Model => least_s,
+            PriceRule::Profile | PriceRule::Model => least_s / settings.unguided_speed,
         };
         let bypass_s = if option.is_bypass { settings.bypass_surcharge_s } else { 0.0 };
         let measured = measured.filter(|_| settings.cost_update);
@@ -314,8 +314,12 @@ impl<'a> Search<'a> {
         let (robot, start) = (self.world.guide_robot(), self.query.start);
         let price_s =
             |guide: &GuidePath| self.pricer.cost_s(&self.pricer.price(LegId::Direct, guide, None), None);
-        let cheapest = ridge_routes(&robot, start, end).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
-        cheapest.or_else(|| routes(&robot, start, end, 0.5 * self.goal.radius_m).next())
+        let routes_in = ridge_routes(&robot, start, end).take(self.settings.direct_routes);
+        let cheapest = routes_in.min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
+        let is_patient = self.settings.direct_routes > 1;
+        let manoeuvred =
+            || if is_patient { routes(&robot, start, end, 0.5 * self.goal.radius_m).next() } else { None };
+        cheapest.or_else(manoeuvred)
     }
 
     fn guided(&self, candidate: &Candidate, guide: GuidePath) -> GuidedOption {

@@ -9,7 +9,7 @@ use sharp_sim::RobotState;
 use crate::known::KnownOptions;
 use crate::learn::LearntPolicy;
 use crate::method::Method;
-use crate::odds::{ComposedOdds, compose};
+use crate::odds::{ComposedOdds, Piece, compose};
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Query;
@@ -125,20 +125,19 @@ pub(crate) fn verify(
 pub(crate) fn predict(
     problem: &PlanningProblem<'_>,
     plan: &[Arc<GuidedOption>],
-    policies: &Policies<'_>,
+    policies: &mut Policies<'_>,
     known: &KnownOptions,
 ) -> Solution {
     let odds = compose(problem, plan, policies, known);
+    note_ends(plan, policies, &odds);
     let planned = |(index, option): (usize, &Arc<GuidedOption>)| {
         let learnt = policies.learnt(option.id).clone();
-        // The piece that ends in this leg, or in the goal.
-        let piece = odds.pieces[index.min(odds.pieces.len() - 1)];
-        let episodes = piece.episodes.round() as u32;
-        let successes = (piece.success * f64::from(episodes)).round() as u32;
+        let is_in = |piece: &&Piece| piece.until > index as f64;
+        let piece = odds.pieces.iter().find(is_in).expect("pieces reach the goal");
         PlannedOption {
             option: Arc::clone(option),
             reused: policies.is_reused(option.id),
-            on_arrival: SuccessCount { episodes, successes },
+            on_arrival: piece.count(),
             arrival_time_s: learnt.estimate.mean_time_s,
             learnt,
         }
@@ -149,6 +148,16 @@ pub(crate) fn predict(
         predicted: odds.count(),
         predicted_time_s: odds.time_s,
         composed: Some(odds),
+    }
+}
+
+/// Notes how the first and the last leg did, so that the search takes other ones where they fail.
+fn note_ends(plan: &[Arc<GuidedOption>], policies: &mut Policies<'_>, odds: &ComposedOdds) {
+    let ends = [(plan.first(), odds.pieces.first()), (plan.last(), odds.pieces.last())];
+    for (leg, piece) in ends.into_iter().filter_map(|(leg, piece)| leg.zip(piece)) {
+        if leg.id.role() != Role::Option {
+            policies.note(leg.id, SuccessEstimate { count: piece.count(), mean_time_s: f64::INFINITY });
+        }
     }
 }
 

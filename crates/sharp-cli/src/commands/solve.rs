@@ -114,7 +114,8 @@ fn method(args: &Solve) -> Result<Method, Failure> {
         };
         (method.verify_episodes, method.verify_half_width) = (episodes.ok_or_else(usage)?, 0.0);
     }
-    Ok(if args.guide == Guide::Paper { method.with_learn_and_link() } else { method })
+    let method = if args.guide == Guide::Paper { method.with_learn_and_link() } else { method };
+    Ok(if method.verify_episodes == 0 { method.composed() } else { method })
 }
 
 /// The folder asked for, or a fresh one.
