@@ -19,7 +19,7 @@ use sharp_bench::{AbstractionRequest, NamedWorld, SolveSettings, Stopwatch, Time
 use sharp_drive::SuccessCount;
 use sharp_maps::{LoadOptions, load};
 use sharp_options::OptionKind;
-use sharp_plan::{Answer, Method, Plan, Query, RunSettings, Sharp, run, success};
+use sharp_plan::{Answer, Method, Plan, Query, RunSettings, run, success};
 use sharp_rbvd::CellMetric;
 use sharp_sim::SimulatorKind;
 use sharp_space::{Pose, Seed};
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut method = Method::fast().composed();
     method.search.direct = std::env::var_os("DIRECT").is_none_or(|value| value != "0");
     let settings = SolveSettings { abstraction, method, simulator: SimulatorKind::Kinematic, seed: 1 };
-    let mut sharp = place.open(&settings, Some(Path::new(library)))?;
+    let (mut sharp, _) = place.open(&settings, Some(Path::new(library)))?;
     println!("library of {} options open after {:.3} s", sharp.library().len(), began.elapsed().as_secs_f64());
     let asked = random_queries(&place, questions);
     // The first question makes what all others share.
@@ -157,11 +157,12 @@ fn compare(
             let legs: Vec<String> = plan.solution.steps.iter().map(|step| step.option.id.to_string()).collect();
             let Query { start, goal } = plan.solution.query;
             println!("{:?} {:?} {:?}", start.position, start.heading, goal.position);
+            println!("{:?}", by_leg(&plan));
             println!("{row:.3?} {:.3} {:?} {}", same.rate(), odds.pieces.iter().map(|p| (p.success * 1000.0).round() / 1000.0).collect::<Vec<_>>(), legs.join(" "));
         }
         if std::env::var_os("COLD").is_some() {
             let alone = SolveSettings { method: Method::fast(), ..settings.clone() };
-            let mut sharp: Sharp = place.open(&alone, None)?;
+            let (mut sharp, _) = place.open(&alone, None)?;
             if let Answer::Solved(other) = sharp.solve(plan.solution.query, &())? {
                 let (count, other_s) = executed(&Arc::new(*other), index as u64);
                 cold = [cold[0] + count.rate(), cold[1] + (time_s / other_s).ln(), cold[2] + 1.0];
@@ -195,4 +196,24 @@ fn driven_as_learnt(plan: &Arc<Plan>, number: u64) -> SuccessCount {
     settings.simulator = plan.world.simulator(SimulatorKind::Kinematic);
     settings.recovery = false;
     success(&run(plan, &settings, &|| 0.0))
+}
+
+/// Of those that entered a leg, the share that came through.
+fn by_leg(plan: &Arc<Plan>) -> Vec<f64> {
+    use sharp_drive::{Driver, MonteCarlo};
+    let steps = &plan.solution.steps;
+    let next = |leg: usize| steps.get(leg + 1).map(|next| &next.option);
+    let legs = steps.iter().enumerate();
+    let drivers: Vec<_> =
+        legs.map(|(leg, step)| Driver::new(&step.option, &step.learnt.policy, next(leg))).collect();
+    let simulator = plan.world.simulator(SimulatorKind::Kinematic);
+    let trial = MonteCarlo::new(&plan.world, &*simulator, &plan.noise).with_episodes(EXECUTIONS).with_seed(Seed(5));
+    let runs = trial.runs(&drivers, sharp_sim::RobotState::at_rest(plan.solution.query.start));
+    let entered = |leg: usize| runs.iter().filter(move |run| run.visits.len() > leg);
+    (0..steps.len())
+        .map(|leg| {
+            let count = SuccessCount::count(entered(leg).map(|run| run.passed(leg)));
+            (1000.0 * count.rate()).round() / 1000.0
+        })
+        .collect()
 }

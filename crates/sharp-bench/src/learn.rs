@@ -7,7 +7,7 @@ use serde::Serialize;
 use sharp_drive::World;
 use sharp_maps::MapFile;
 use sharp_plan::{
-    Area, BuildingMonitor, BuildingWork, MeasuredStretch, OptionLibrary, Part, Roster, Sharp, WeakPlace,
+    AbstractionFile, Area, BuildingMonitor, BuildingWork, MeasuredStretch, OptionLibrary, Part, Roster, Sharp, WeakPlace,
     measured_stretches, weak_places,
 };
 use sharp_sim::NoiseModel;
@@ -56,20 +56,25 @@ impl NamedWorld {
     ///
     /// # Errors
     /// If the map has no room for the robot, or a file is broken.
-    pub fn open(&self, settings: &SolveSettings, library: Option<&Path>) -> Result<Sharp, BenchError> {
+    pub fn open(
+        &self,
+        settings: &SolveSettings,
+        library: Option<&Path>,
+    ) -> Result<(Sharp, AbstractionFile), BenchError> {
         let SolveSettings { abstraction, method, simulator, seed } = settings;
         let Self { world, noise_model, .. } = self;
         let library = match library {
             Some(root) => OptionLibrary::open_for(root, world, noise_model, *simulator, method)?,
             None => OptionLibrary::in_memory(),
         };
-        let (sharp, _) = prepare(world.clone(), abstraction, library.folder(), &())?;
-        Ok(sharp
+        let (sharp, file) = prepare(world.clone(), abstraction, library.folder(), &())?;
+        let sharp = sharp
             .with_method(method.clone())
             .with_noise(noise_model.clone())
             .with_simulator(world.simulator(*simulator))
             .with_library(library)
-            .with_seed(Seed(*seed)))
+            .with_seed(Seed(*seed));
+        Ok((sharp, file))
     }
 }
 
@@ -154,7 +159,7 @@ pub fn learn(
     (within, part): (Option<Area>, Part),
     monitor: &dyn BuildingMonitor,
 ) -> Result<LearntBuilding, BenchError> {
-    let mut sharp = place.open(settings, Some(library))?;
+    let (mut sharp, _) = place.open(settings, Some(library))?;
     let (roster, work) = sharp.learn_building((within, part), monitor)?;
     let stretches = sharp
         .library()

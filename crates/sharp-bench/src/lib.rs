@@ -33,6 +33,7 @@ pub mod pictures;
 mod baselines;
 mod contender;
 mod curves;
+mod dispatch;
 mod error;
 mod evaluation;
 mod jobs;
@@ -52,6 +53,7 @@ mod tour;
 pub use baselines::{FlatSac, Mpc, RoutePlanner, Rrt, SacBudget, Track};
 pub use contender::{ComparisonSettings, Composed, Contender, Driven, compare};
 pub use curves::CurveFolder;
+pub use dispatch::{DispatchLine, Dispatcher, Instruction, Odds};
 pub use error::BenchError;
 pub use evaluation::{ReportError, ReportInput, table, totals, write_report};
 pub use jobs::{

@@ -308,8 +308,20 @@ pub(crate) struct Export {
 
 #[derive(Debug, Args)]
 pub(crate) struct Serve {
-    /// The folder that `sharp solve` wrote.
-    pub(crate) plan_dir: PathBuf,
+    /// The folder that `sharp solve` wrote; with --library a map, in which goals come as lines.
+    #[arg(value_name = "PLAN_DIR|MAP")]
+    pub(crate) place: String,
+    /// A library that `sharp learn` filled: goals come as lines, and the first argument is the map.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) library: Option<PathBuf>,
+    /// With --library: metres a cell, for maps that do not say.
+    #[arg(long, value_name = "M", requires = "library")]
+    pub(crate) resolution: Option<f64>,
+    #[command(flatten)]
+    pub(crate) abstraction: AbstractionArgs,
+    /// With --library: none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
+    #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
+    pub(crate) noise: String,
 }
 
 #[derive(Debug, Args)]

@@ -3,7 +3,7 @@
 //! The success of a plan is no product of the successes of its options: how an option is entered matters, and so does
 //! where its guide comes from once the guides of the plan are joined. Some metres on, both are forgotten. So a plan is
 //! cut in the middle of each option, and each piece between two cuts is measured as a plan would drive it: with joined
-//! guides, by robots that have driven two metres before the first cut. Where the first option is too short for that,
+//! guides, by robots that have driven three metres before the first cut. Where the first option is too short for that,
 //! they come from the option before it that leads on most straight.
 
 use std::sync::Arc;
@@ -29,11 +29,11 @@ const HALF_WIDTH: f64 = 0.0075;
 const STATE_POOL: usize = 64;
 /// How they spread: as robots arrive there. They have half an option left to get onto the guide.
 const ARRIVING: StateSpread = 
-    StateSpread { radius_m: 0.15, heading_sd_rad: 0.15, speed_max_mps: 0.6 };
+    StateSpread { radius_m: 0.15, heading_sd_rad: 0.15, speed_max_mps: 1.0 };
 /// Raised whenever hand-overs are measured in another way.
-const RULE: u32 = 2;
+const RULE: u32 = 3;
 /// Way that is driven before the first cut, metres.
-pub(crate) const RUN_UP_M: f64 = 2.0;
+pub(crate) const RUN_UP_M: f64 = 3.0;
 /// Options before the first one, at most.
 pub(crate) const RUN_UP_MAX: usize = 4;
 

@@ -19,15 +19,15 @@ use crate::price::Pricer;
 use crate::problem::PlanningProblem;
 
 /// Runs of a piece that no library has: first so many, and where one of them fails up to so many more.
-const EPISODES: (u32, u32) = (32, 128);
+const EPISODES: (u32, u32) = (32, 384);
 /// Half the width of the 95 % interval at which these end.
-const HALF_WIDTH: f64 = 0.03;
+const HALF_WIDTH: f64 = 0.02;
 /// Runs that the cost model's word counts as beside them: it knows little of places where a robot barely fits.
 const PRICE_EPISODES: f64 = 16.0;
 /// States in which the option before a last leg begins.
 const STATE_POOL: usize = 8;
 /// How they spread: as robots pass there.
-const PASSING: StateSpread = StateSpread { radius_m: 0.08, heading_sd_rad: 0.08, speed_max_mps: 0.6 };
+const PASSING: StateSpread = StateSpread { radius_m: 0.08, heading_sd_rad: 0.08, speed_max_mps: 1.0 };
 /// Successes that tell a mean time.
 const TIMED_MIN: u32 = 8;
 

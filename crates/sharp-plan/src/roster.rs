@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn short_options_are_reached_over_those_before_them() {
         let before = [None, Some(0), Some(1), Some(2)];
-        let lengths_m = [3.0, 1.2, 0.4, 5.0];
+        let lengths_m = [3.0, 1.2, 0.4, 7.0];
         let chains = [0, 1, 2, 3].map(|of| run_up(&before, &lengths_m, of));
         assert_eq!(chains, [vec![], vec![0], vec![0, 1], vec![]]);
     }

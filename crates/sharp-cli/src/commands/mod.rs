@@ -15,4 +15,5 @@ mod regions_train;
 pub(crate) mod robot;
 pub(crate) mod run;
 pub(crate) mod serve;
+pub(crate) mod serve_library;
 pub(crate) mod solve;

@@ -1,6 +1,7 @@
 //! `sharp serve`: drives any robot or simulator from outside, one JSON line each way.
 
 use std::io::{BufRead, Write};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use sharp_drive::{Command, Controller, Decision, Motion};
@@ -32,7 +33,7 @@ struct Reply<'a> {
 }
 
 pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
-    let tour = load_tour(&args.plan_dir)?;
+    let tour = load_tour(Path::new(&args.place))?;
     let plan = &tour.plans[0];
     let mut driver: Option<Served> = None;
     let mut out = std::io::stdout().lock();
@@ -77,9 +78,17 @@ fn is_placed(plan: &Plan, pose: &Pose) -> bool {
     grid.frame().cell_at(pose.position).is_some_and(|cell| grid.get(cell) == Occupancy::Free)
 }
 
-/// The robot's state; motion that was not told is taken from the last two poses, one action apart.
 fn state(request: &Request, before: Option<&RobotState>) -> RobotState {
-    let pose = Pose::from(request.pose);
+    estimated_state(request.pose, (request.speed, request.yaw_rate), before)
+}
+
+/// The robot's state; motion that was not told is taken from the last two poses, one action apart.
+pub(crate) fn estimated_state(
+    pose: [f64; 3],
+    (speed, yaw_rate): (Option<f64>, Option<f64>),
+    before: Option<&RobotState>,
+) -> RobotState {
+    let pose = Pose::from(pose);
     let mut state = RobotState::at_rest(pose);
     let action_s = ActionSettings::default().action_s;
     if let Some(before) = before {
@@ -87,10 +96,10 @@ fn state(request: &Request, before: Option<&RobotState>) -> RobotState {
         state.yaw_rate_radps = before.pose.heading.turn_to(pose.heading) / action_s;
         state.steer_rad = before.steer_rad;
     }
-    if let Some(speed) = request.speed {
+    if let Some(speed) = speed {
         state.velocity = Vector::new(speed, 0.0);
     }
-    state.yaw_rate_radps = request.yaw_rate.unwrap_or(state.yaw_rate_radps);
+    state.yaw_rate_radps = yaw_rate.unwrap_or(state.yaw_rate_radps);
     state
 }
 
