@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use sharp_drive::SuccessEstimate;
-use sharp_guide::{GuidedOption, LegId, join_guides};
+use sharp_guide::{GuideRobot, GuidedOption, LegId, Role, join_guides};
 
 use crate::abstraction::Abstraction;
 use crate::files::FileError;
@@ -28,7 +28,7 @@ const ATTEMPTS_MAX: usize = 24;
 /// Plans run from end to end before the best of them is taken.
 const VERIFIED_MAX: usize = 4;
 /// The same where odds are composed.
-const COMPOSED_MAX: usize = 3;
+const COMPOSED_MAX: usize = 2;
 
 /// How solving ended.
 #[derive(Debug)]
@@ -173,7 +173,22 @@ fn join(problem: &PlanningProblem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<
         return plan;
     }
     let robot = problem.world.guide_robot();
-    join_guides(plan, problem.query.start, &robot, &problem.method.search.guide)
+    let (start, settings) = (problem.query.start, &problem.method.search.guide);
+    if problem.method.verify_episodes > 0 {
+        return join_guides(plan, start, &robot, settings);
+    }
+    // What is composed must drive as it was measured: a start or goal with little room must not take the safety margin from
+    // the options between. So either the whole plan is joined with the full margin, or its options alone.
+    let widest = GuideRobot { inflated: &robot.inflated[..robot.inflated.len().min(1)], ..robot };
+    let joined = join_guides(plan.clone(), start, &widest, settings);
+    if joined.iter().zip(&plan).any(|(joined, alone)| !Arc::ptr_eq(joined, alone)) {
+        return joined;
+    }
+    let is_option = |leg: &Arc<GuidedOption>| leg.id.role() == Role::Option;
+    let options: Vec<_> = plan.iter().filter(|leg| is_option(leg)).cloned().collect();
+    let Some(start) = options.first().map(|first| first.guide.start()) else { return plan };
+    let mut options = join_guides(options, start, &robot, settings).into_iter();
+    plan.into_iter().map(|leg| if is_option(&leg) { options.next().unwrap_or(leg) } else { leg }).collect()
 }
 
 fn has_weak_option(

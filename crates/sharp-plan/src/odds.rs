@@ -19,7 +19,7 @@ use crate::price::Pricer;
 use crate::problem::PlanningProblem;
 
 /// Runs of a piece that no library has: first so many, and where one of them fails up to so many more.
-const EPISODES: (u32, u32) = (32, 384);
+const EPISODES: (u32, u32) = (32, 192);
 /// Half the width of the 95 % interval at which these end.
 const HALF_WIDTH: f64 = 0.02;
 /// Runs that the cost model's word counts as beside them: it knows little of places where a robot barely fits.
