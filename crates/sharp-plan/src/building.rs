@@ -306,3 +306,112 @@ fn known_identity(library: &OptionLibrary, option: &RosterOption) -> Option<Stri
     let stored = library.get(option.id).filter(|stored| stored.corridor == option.corridor)?;
     Some(identity(&stored.corridor, &stored.learnt.policy))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use sharp_options::OptionKind;
+    use sharp_sim::NoiseModel;
+
+    use super::*;
+    use crate::test_worlds::world;
+
+    /// A corridor of 30 m with regions all along it, and at its far end, with or without a pillar.
+    fn corridor(pillar: bool) -> String {
+        let row = |middle: bool, pillar: bool| {
+            let mark = |col: usize| match col {
+                6 => '0',
+                20 => '1',
+                34 => '2',
+                48 => '3',
+                62 => '4',
+                _ => '.',
+            };
+            let cell = |col: usize| match col {
+                56..=57 if pillar => '#',
+                col if middle => mark(col),
+                _ => '.',
+            };
+            format!("#{}#", (0..74).map(cell).collect::<String>())
+        };
+        let rows = (0..9).map(|index| row(index == 4, pillar && index >= 7));
+        let wall = "#".repeat(76);
+        [vec![wall.clone()], rows.collect(), vec![wall]].concat().join("\n")
+    }
+
+    /// Stops when it was asked so often.
+    struct StopAfter(AtomicUsize);
+
+    impl BuildingMonitor for StopAfter {
+        fn should_stop(&self) -> bool {
+            let asked = |left: usize| left.checked_sub(1);
+            self.0.fetch_update(Ordering::SeqCst, Ordering::SeqCst, asked).is_err()
+        }
+    }
+
+    /// Learns a corridor into the folder of `map`.
+    fn learn(root: &Path, map: &str, pillar: bool, part: Part, monitor: &dyn BuildingMonitor) -> BuildingWork {
+        let (world, abstraction) = world(&corridor(pillar), OptionKind::Interface);
+        let method = Method::fast().with_episodes(50, 50, 50);
+        let conditions = Conditions::new(&world, NoiseModel::nominal());
+        let site = Site {
+            world: &world,
+            abstraction: &abstraction,
+            method: &method,
+            conditions: &conditions,
+            seed: Seed(1),
+        };
+        let roster = Roster::new(&site, None);
+        let mut library = OptionLibrary::open(root, map).expect("a sound folder");
+        let mut work = BuildingWork::default();
+        learn_options((&site, &roster), &mut library, part, monitor, &mut work).expect("written");
+        if !monitor.should_stop() {
+            learn_hand_overs((&site, &roster), &mut library, part, monitor, &mut work).expect("written");
+        }
+        work
+    }
+
+    /// The files of a library, by name.
+    fn files(root: &Path, map: &str) -> Vec<(String, Vec<u8>)> {
+        let entries = fs::read_dir(root.join(map)).expect("a folder").map(|entry| entry.expect("a file").path());
+        let name = |path: &Path| path.file_name().expect("a name").to_string_lossy().into_owned();
+        let mut files: Vec<_> =
+            entries.map(|path| (name(&path), fs::read(&path).expect("no folder is left"))).collect();
+        files.sort();
+        files
+    }
+
+    #[test]
+    fn a_building_is_the_same_in_one_go_in_parts_and_after_stops() {
+        let root = tempfile::tempdir().expect("a folder");
+        let whole = learn(root.path(), "w-1-whole", false, Part::ALL, &());
+        assert!(whole.is_whole && whole.hand_overs.0 > 3, "{whole:?}");
+        let part = |index| learn(root.path(), "x-1-parts", false, Part { index, count: 2 }, &());
+        let parts = [part(1), part(0), part(1)];
+        assert!(!parts[0].is_whole && parts[2].is_whole, "{parts:?}");
+        let mut stops = 0;
+        while !learn(root.path(), "y-1-stopped", false, Part::ALL, &StopAfter(AtomicUsize::new(stops))).is_whole {
+            stops += 1;
+            assert!(stops < 50, "it never ends");
+        }
+        assert!(stops > 0, "it was over before the first stop");
+        let expected = files(root.path(), "w-1-whole");
+        assert_eq!(files(root.path(), "x-1-parts"), expected);
+        assert_eq!(files(root.path(), "y-1-stopped"), expected);
+    }
+
+    #[test]
+    fn a_changed_map_relearns_what_the_change_touches_and_equals_learning_from_nothing() {
+        let root = tempfile::tempdir().expect("a folder");
+        let before = learn(root.path(), "w-1-before", false, Part::ALL, &());
+        let changed = learn(root.path(), "w-1-changed", true, Part::ALL, &());
+        assert!(changed.adopted > 0 && !changed.learnt.is_empty(), "{changed:?}");
+        assert!(changed.learnt.len() < before.learnt.len(), "{changed:?}");
+        assert!(changed.hand_overs.1 > 0 && changed.hand_overs.0 < before.hand_overs.0, "{changed:?}");
+        learn(root.path(), "v-1-afresh", true, Part::ALL, &());
+        assert_eq!(files(root.path(), "w-1-changed"), files(root.path(), "v-1-afresh"));
+    }
+}

@@ -19,10 +19,11 @@ use crate::price::Pricer;
 use crate::problem::PlanningProblem;
 
 /// Runs of a piece that no library has: first so many, and where one of them fails up to so many more.
-const EPISODES: (u32, u32) = (32, 192);
+const EPISODES: (u32, u32) = (48, 192);
 /// Half the width of the 95 % interval at which these end.
 const HALF_WIDTH: f64 = 0.02;
-/// Runs that the cost model's word counts as beside them: it knows little of places where a robot barely fits.
+/// Runs that the cost model's word counts as beside runs none of which failed. Where some fail, runs alone count: the model
+/// knows little of places where a robot barely fits.
 const PRICE_EPISODES: f64 = 16.0;
 /// States in which the option before a last leg begins.
 const STATE_POOL: usize = 8;
@@ -170,8 +171,9 @@ fn end_piece(
 ) -> Piece {
     let SuccessEstimate { count, mean_time_s } = drive(problem, plan, policies, (from, to));
     let (priced_s, success) = priced(problem, plan, (from, to));
-    let episodes = PRICE_EPISODES + f64::from(count.episodes);
-    let success = (PRICE_EPISODES * success + f64::from(count.successes)) / episodes;
+    let weight = if count.failures() == 0 { PRICE_EPISODES } else { 0.0 };
+    let episodes = weight + f64::from(count.episodes);
+    let success = (weight * success + f64::from(count.successes)) / episodes;
     let time_s = if count.successes >= TIMED_MIN { mean_time_s } else { priced_s };
     let until = if to < plan.len() { to as f64 + 0.5 } else { to as f64 };
     Piece { until, success, episodes, time_s }

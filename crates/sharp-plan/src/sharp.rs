@@ -270,3 +270,42 @@ impl Sharp {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sharp_drive::SuccessCount;
+    use sharp_options::OptionKind;
+    use sharp_sim::SimulatorKind;
+    use sharp_space::Pose;
+
+    use super::*;
+    use crate::execute::{RunSettings, run, success};
+    use crate::test_worlds::{RING, world};
+
+    fn ring() -> Sharp {
+        let (world, abstraction) = world(RING, OptionKind::Interface);
+        Sharp::new(world, sharp_regions::GeometricDetector::default())
+            .with_abstraction(abstraction, "drawn")
+            .with_method(Method::fast().composed())
+    }
+
+    #[test]
+    fn odds_are_composed_of_what_was_learnt_and_hold() {
+        let mut sharp = ring();
+        let (roster, work) = sharp.learn_building((None, Part::ALL), &()).expect("in memory");
+        assert!(work.is_whole && !roster.options.is_empty(), "{work:?}");
+        let query = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+        let Answer::Solved(plan) = sharp.solve(query, &()).expect("in memory") else { panic!("a ring") };
+        let odds = plan.solution.composed.clone().expect("nothing was run");
+        assert_eq!(plan.solution.reuse().0, plan.solution.reuse().1, "every option was known");
+        let plan = Arc::new(*plan);
+        let mut settings = RunSettings::new(&plan, 400, Seed(9));
+        settings.simulator = plan.world.simulator(SimulatorKind::Kinematic);
+        let executions = run(&plan, &settings, &|| 0.0);
+        let SuccessCount { episodes, successes } = success(&executions);
+        let (rate, n) = (f64::from(successes) / f64::from(episodes), f64::from(episodes));
+        assert!((odds.success - rate).abs() < 0.03, "{} predicted, {rate} measured", odds.success);
+        let time_s = executions.iter().map(|one| one.record.time_s).sum::<f64>() / n;
+        assert!((odds.time_s / time_s - 1.0).abs() < 0.1, "{} s predicted, {time_s} s measured", odds.time_s);
+    }
+}
