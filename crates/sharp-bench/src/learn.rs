@@ -194,7 +194,7 @@ fn report(
         pairs: stretches.len(),
         new_pairs: work.hand_overs.0,
         success: BuildingSuccess {
-            mean: rates.iter().sum::<f64>() / (rates.len().max(1)) as f64,
+            mean: if rates.is_empty() { 1.0 } else { rates.iter().sum::<f64>() / rates.len() as f64 },
             worst: rates.iter().copied().fold(1.0, f64::min),
         },
         weakest: weakest.iter().map(|weak| weak_report(weak, &place.world)).collect(),

@@ -322,7 +322,8 @@ fn serve_answers_every_line() {
 fn a_learnt_building_answers_solves_and_serves() {
     let folder = tempfile::tempdir().unwrap();
     write_rooms(folder.path(), true);
-    let learn = ["--json", "learn", "rooms.yaml", "--regions", "geometric", "--library", "lib", "--out", "pictures"];
+    let kind = ["--options", "centroid", "--library", "lib"];
+    let learn = [&["--json", "learn", "rooms.yaml", "--regions", "geometric", "--out", "pictures"], &kind[..]].concat();
     let output = sharp(folder.path(), &learn);
     let report = json(&output);
     assert_eq!((output.status.code(), &report["status"]), (Some(0), &"whole".into()), "{report}");
@@ -332,13 +333,14 @@ fn a_learnt_building_answers_solves_and_serves() {
     let again = json(&sharp(folder.path(), &learn));
     assert_eq!((again["new"].as_array().map(Vec::len), &again["new_pairs"]), (Some(0), &0.into()), "{again}");
 
-    let solved = json(&solve_rooms(folder.path(), &["--library", "lib", "--verify", "0", "--out", "plan"]));
+    let solved = json(&solve_rooms(folder.path(), &[&kind[..], &["--verify", "0", "--out", "plan"]].concat()));
     assert_eq!(solved["predicted"]["basis"], "composed", "{solved}");
     assert_eq!(solved["reuse"]["uses"], solved["reuse"]["reused"], "{solved}");
     assert!(solved["predicted"]["success"].as_f64() > Some(0.8), "{solved}");
 
     let mut child = Command::new(env!("CARGO_BIN_EXE_sharp"))
-        .args(["serve", "rooms.yaml", "--regions", "geometric", "--library", "lib"])
+        .args(["serve", "rooms.yaml", "--regions", "geometric"])
+        .args(kind)
         .current_dir(folder.path())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

@@ -6,7 +6,7 @@ use clap::Args;
 use sharp_plan::{Area, Part};
 use sharp_space::Point;
 
-use super::{AbstractionArgs, EngineName, Learning, MapArgs};
+use super::{AbstractionArgs, Learning, MapArgs};
 
 /// Learn every option of a building ahead of time.
 #[derive(Debug, Args)]
@@ -33,13 +33,7 @@ pub(crate) struct Learn {
     /// Only the options whose two ends lie in this rectangle, metres in the map's frame.
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true, value_parser = area)]
     pub(crate) within: Option<Area>,
-    /// Who does the work: this program, or a Slurm cluster that sees the library's folder.
-    #[arg(long, value_enum, default_value_t = EngineName::Local)]
-    pub(crate) engine: EngineName,
-    /// Tasks that a cluster is given; here it changes nothing, --threads does.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub(crate) jobs: u32,
-    /// Only part I of N of the work, from 0: what a task of a cluster does.
+    /// Only part I of N of the work, from 0: what one of several processes or tasks of a cluster does (docs/scale.md).
     #[arg(long, value_name = "I/N", value_parser = part)]
     pub(crate) part: Option<Part>,
 }
