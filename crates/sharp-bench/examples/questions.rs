@@ -8,7 +8,11 @@
 //! The last two numbers: questions, and how many of them are compared with 1,000 executions each and with a plan
 //! that is made without the library (0 leaves both out).
 
-#![allow(clippy::disallowed_methods, clippy::print_stdout, reason = "a measurement reads the clock and prints")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::print_stdout,
+    reason = "a measurement reads the clock and prints"
+)]
 
 use std::path::Path;
 use std::sync::Arc;
@@ -43,7 +47,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     method.search.direct = std::env::var_os("DIRECT").is_none_or(|value| value != "0");
     let settings = SolveSettings { abstraction, method, simulator: SimulatorKind::Kinematic, seed: 1 };
     let (mut sharp, _) = place.open(&settings, Some(Path::new(library)))?;
-    println!("library of {} options open after {:.3} s", sharp.library().len(), began.elapsed().as_secs_f64());
+    println!(
+        "library of {} options open after {:.3} s",
+        sharp.library().len(),
+        began.elapsed().as_secs_f64()
+    );
     let asked = random_queries(&place, questions);
     // The first question makes what all others share.
     let first = Instant::now();
@@ -78,7 +86,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             Answer::Stopped => {}
         }
     }
-    println!("{} answered, {refused} refused, {direct} direct, {reused} of {uses} options reused", plans.len());
+    println!(
+        "{} answered, {refused} refused, {direct} direct, {reused} of {uses} options reused",
+        plans.len()
+    );
     for (name, times_ms) in [("wall", &mut times_ms), ("processor", &mut cpus_ms)] {
         times_ms.sort_by(f64::total_cmp);
         let at = |share: f64| times_ms[((times_ms.len() - 1) as f64 * share) as usize];
@@ -91,7 +102,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         );
     }
     let mean_ms = phases.map(|seconds| 1e3 * seconds / asked.len() as f64);
-    println!("mean in ms: search {:.2}, guides {:.2}, learning {:.2}, odds {:.2}", mean_ms[0], mean_ms[1], mean_ms[2], mean_ms[3]);
+    println!(
+        "mean in ms: search {:.2}, guides {:.2}, learning {:.2}, odds {:.2}",
+        mean_ms[0], mean_ms[1], mean_ms[2], mean_ms[3]
+    );
     compare(&place, &settings, &plans[..compared.min(plans.len())])
 }
 
@@ -154,11 +168,17 @@ fn compare(
         let row = [odds.success, measured, odds.time_s, time_s];
         sums = std::array::from_fn(|i| sums[i] + row[i]);
         if (odds.success - measured).abs() > 0.03 || (odds.time_s / time_s - 1.0).abs() > 0.05 {
-            let legs: Vec<String> = plan.solution.steps.iter().map(|step| step.option.id.to_string()).collect();
+            let legs: Vec<String> =
+                plan.solution.steps.iter().map(|step| step.option.id.to_string()).collect();
             let Query { start, goal } = plan.solution.query;
             println!("{:?} {:?} {:?}", start.position, start.heading, goal.position);
             println!("{:?}", by_leg(&plan));
-            println!("{row:.3?} {:.3} {:?} {}", same.rate(), odds.pieces.iter().map(|p| (p.success * 1000.0).round() / 1000.0).collect::<Vec<_>>(), legs.join(" "));
+            println!(
+                "{row:.3?} {:.3} {:?} {}",
+                same.rate(),
+                odds.pieces.iter().map(|p| (p.success * 1000.0).round() / 1000.0).collect::<Vec<_>>(),
+                legs.join(" ")
+            );
         }
         if std::env::var_os("COLD").is_some() {
             let alone = SolveSettings { method: Method::fast(), ..settings.clone() };
@@ -171,20 +191,40 @@ fn compare(
     }
     let n = plans.len().max(1) as f64;
     println!("{} plans against {EXECUTIONS} executions each:", plans.len());
-    println!("  success within 3 points: {:.3}, bounds hold: {:.3}, lower bound holds: {:.3}", close as f64 / n, bounded as f64 / n, above as f64 / n);
-    println!("  the same in the simulator of learning, without recovery: {:.3}, {:.3}", alike as f64 / n, alike_bounded as f64 / n);
+    println!(
+        "  success within 3 points: {:.3}, bounds hold: {:.3}, lower bound holds: {:.3}",
+        close as f64 / n,
+        bounded as f64 / n,
+        above as f64 / n
+    );
+    println!(
+        "  the same in the simulator of learning, without recovery: {:.3}, {:.3}",
+        alike as f64 / n,
+        alike_bounded as f64 / n
+    );
     println!("  time within 5 %: {:.3}", timed as f64 / n);
-    println!("  mean error of success {:+.4}; predicted {:.4}, executed {:.4}", error / n, sums[0] / n, sums[1] / n);
+    println!(
+        "  mean error of success {:+.4}; predicted {:.4}, executed {:.4}",
+        error / n,
+        sums[0] / n,
+        sums[1] / n
+    );
     println!("  time predicted {:.2} s, executed {:.2} s", sums[2] / n, sums[3] / n);
     if cold[2] > 0.0 {
-        println!("  without the library: success {:.4} ({} plans), our time is {:.3} of it", cold[0] / cold[2], cold[2], (cold[1] / cold[2]).exp());
+        println!(
+            "  without the library: success {:.4} ({} plans), our time is {:.3} of it",
+            cold[0] / cold[2],
+            cold[2],
+            (cold[1] / cold[2]).exp()
+        );
     }
     Ok(())
 }
 
 /// How often `plan` succeeds as it is executed, and how long that takes, seconds.
 fn executed(plan: &Arc<Plan>, number: u64) -> (SuccessCount, f64) {
-    let executions = run(plan, &RunSettings::new(plan, EXECUTIONS, Seed(99).child("executions", number)), &|| 0.0);
+    let executions =
+        run(plan, &RunSettings::new(plan, EXECUTIONS, Seed(99).child("executions", number)), &|| 0.0);
     let reached = executions.iter().filter(|one| one.end == sharp_drive::EpisodeEnd::Reached);
     let times: Vec<f64> = reached.map(|one| one.record.time_s).collect();
     (success(&executions), times.iter().sum::<f64>() / times.len().max(1) as f64)
@@ -207,7 +247,8 @@ fn by_leg(plan: &Arc<Plan>) -> Vec<f64> {
     let drivers: Vec<_> =
         legs.map(|(leg, step)| Driver::new(&step.option, &step.learnt.policy, next(leg))).collect();
     let simulator = plan.world.simulator(SimulatorKind::Kinematic);
-    let trial = MonteCarlo::new(&plan.world, &*simulator, &plan.noise).with_episodes(EXECUTIONS).with_seed(Seed(5));
+    let trial =
+        MonteCarlo::new(&plan.world, &*simulator, &plan.noise).with_episodes(EXECUTIONS).with_seed(Seed(5));
     let runs = trial.runs(&drivers, sharp_sim::RobotState::at_rest(plan.solution.query.start));
     let entered = |leg: usize| runs.iter().filter(move |run| run.visits.len() > leg);
     (0..steps.len())

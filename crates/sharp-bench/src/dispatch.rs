@@ -275,5 +275,11 @@ fn odds(plan: &Plan) -> Odds {
 }
 
 fn standing(status: &'static str) -> DispatchLine {
-    DispatchLine::Instruction(Instruction { waypoint: None, speed: 0.0, option: String::new(), status, odds: None })
+    DispatchLine::Instruction(Instruction {
+        waypoint: None,
+        speed: 0.0,
+        option: String::new(),
+        status,
+        odds: None,
+    })
 }

@@ -7,8 +7,8 @@ use serde::Serialize;
 use sharp_drive::World;
 use sharp_maps::MapFile;
 use sharp_plan::{
-    AbstractionFile, Area, BuildingMonitor, BuildingWork, MeasuredStretch, OptionLibrary, Part, Roster, Sharp, WeakPlace,
-    measured_stretches, weak_places,
+    AbstractionFile, Area, BuildingMonitor, BuildingWork, MeasuredStretch, OptionLibrary, Part, Roster,
+    Sharp, WeakPlace, measured_stretches, weak_places,
 };
 use sharp_sim::NoiseModel;
 use sharp_space::{Cell, GridFrame, Point, Seed};

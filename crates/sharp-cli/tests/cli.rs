@@ -322,24 +322,29 @@ fn serve_answers_every_line() {
 fn a_learnt_building_answers_solves_and_serves() {
     let folder = tempfile::tempdir().unwrap();
     write_rooms(folder.path(), true);
-    let kind = ["--options", "centroid", "--library", "lib"];
-    let learn = [&["--json", "learn", "rooms.yaml", "--regions", "geometric", "--out", "pictures"], &kind[..]].concat();
+    fs::write(folder.path().join("places.ron"), "[(2.0, 3.0), (6.1, 3.1), (10.0, 3.0)]").unwrap();
+    let kind = ["--options", "centroid", "--regions", "places.ron", "--library", "lib"];
+    let learn = [&["--json", "learn", "rooms.yaml", "--out", "pictures"], &kind[..]].concat();
     let output = sharp(folder.path(), &learn);
     let report = json(&output);
     assert_eq!((output.status.code(), &report["status"]), (Some(0), &"whole".into()), "{report}");
     assert_eq!(report["learnt"], report["options"], "{report}");
     assert!(report["pairs"].as_u64() > Some(0) && report["success"]["mean"].as_f64() > Some(0.8), "{report}");
-    assert!(["success.png", "speed.png"].iter().all(|name| folder.path().join("pictures").join(name).exists()));
+    assert!(
+        ["success.png", "speed.png"].iter().all(|name| folder.path().join("pictures").join(name).exists())
+    );
     let again = json(&sharp(folder.path(), &learn));
     assert_eq!((again["new"].as_array().map(Vec::len), &again["new_pairs"]), (Some(0), &0.into()), "{again}");
 
-    let solved = json(&solve_rooms(folder.path(), &[&kind[..], &["--verify", "0", "--out", "plan"]].concat()));
+    let problem = ["--start", "2.0,3.0,0.0", "--goal", "10.0,3.5,0.0", "--verify", "0", "--out", "plan"];
+    let solved =
+        json(&sharp(folder.path(), &[&["--json", "solve", "rooms.yaml"], &problem[..], &kind[..]].concat()));
     assert_eq!(solved["predicted"]["basis"], "composed", "{solved}");
     assert_eq!(solved["reuse"]["uses"], solved["reuse"]["reused"], "{solved}");
     assert!(solved["predicted"]["success"].as_f64() > Some(0.8), "{solved}");
 
     let mut child = Command::new(env!("CARGO_BIN_EXE_sharp"))
-        .args(["serve", "rooms.yaml", "--regions", "geometric"])
+        .args(["serve", "rooms.yaml"])
         .args(kind)
         .current_dir(folder.path())
         .stdin(Stdio::piped())
@@ -353,15 +358,29 @@ fn a_learnt_building_answers_solves_and_serves() {
     );
     child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
     let output = child.wait_with_output().unwrap();
-    let said: Vec<Value> =
-        String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let said: Vec<Value> = String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
     let words: Vec<&str> = said
         .iter()
-        .map(|line| line["plan"]["status"].as_str().or(line["status"].as_str()).or(line["schema"].as_str()).unwrap())
+        .map(|line| {
+            line["plan"]["status"].as_str().or(line["status"].as_str()).or(line["schema"].as_str()).unwrap()
+        })
         .collect();
     let expected = [
-        "waiting_for_pose", "solved", "running", "sharp.error/1", "running", "no_plan", "no_plan", "solved", "solved",
-        "lost", "cancelled", "no_plan",
+        "waiting_for_pose",
+        "solved",
+        "running",
+        "sharp.error/1",
+        "running",
+        "no_plan",
+        "no_plan",
+        "solved",
+        "solved",
+        "lost",
+        "cancelled",
+        "no_plan",
     ];
     assert_eq!(words, expected, "{said:?}");
     assert!(said[5]["plan"]["reason"].as_str().unwrap().contains("goal"), "{}", said[5]);

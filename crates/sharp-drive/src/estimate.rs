@@ -41,7 +41,9 @@ impl SuccessEstimate {
     /// The estimate of all episodes of both.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
-        let total_s = |of: &Self| if of.count.successes == 0 { 0.0 } else { f64::from(of.count.successes) * of.mean_time_s };
+        let total_s = |of: &Self| {
+            if of.count.successes == 0 { 0.0 } else { f64::from(of.count.successes) * of.mean_time_s }
+        };
         let count = SuccessCount {
             episodes: self.count.episodes + other.count.episodes,
             successes: self.count.successes + other.count.successes,

@@ -12,8 +12,8 @@ use sharp_guide::{GuideRobot, GuidedOption, LegId, Role, join_guides};
 
 use crate::abstraction::Abstraction;
 use crate::files::FileError;
-use crate::learn::learn_missing;
 use crate::known::KnownOptions;
+use crate::learn::learn_missing;
 use crate::library::OptionLibrary;
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
@@ -118,7 +118,10 @@ fn algorithm_1(
             other.map_or(f64::INFINITY, |(seconds, _)| seconds)
         };
         let is_composed = method.verify_episodes == 0;
-        if !is_composed && has_weak_option(problem, &p, &policies) && other_s(&mut search, &policies).is_finite() {
+        if !is_composed
+            && has_weak_option(problem, &p, &policies)
+            && other_s(&mut search, &policies).is_finite()
+        {
             continue;
         }
         // Beyond the paper: Pi is repaired and measured, and the search looks again while another plan seems cheaper.

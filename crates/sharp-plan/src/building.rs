@@ -120,8 +120,13 @@ pub fn learn_options(
     monitor: &dyn BuildingMonitor,
     work: &mut BuildingWork,
 ) -> Result<(), FileError> {
-    let mine: Vec<&RosterOption> =
-        roster.options.iter().enumerate().filter(|(unit, _)| part.has(*unit)).map(|(_, option)| option).collect();
+    let mine: Vec<&RosterOption> = roster
+        .options
+        .iter()
+        .enumerate()
+        .filter(|(unit, _)| part.has(*unit))
+        .map(|(_, option)| option)
+        .collect();
     for chunk in mine.chunks(OPTIONS_AT_ONCE) {
         let shared = &*library;
         let results: Vec<_> = chunk.par_iter().map(|option| obtain(site, shared, option, monitor)).collect();
@@ -170,7 +175,8 @@ fn obtain(
     }
     let Site { world, method, conditions, .. } = *site;
     let seed = site.seed.child(&format!("option {}", option.corridor), 0);
-    let states = InitialStates::of_option(world, &option.option, option.option.guide.start(), STATE_POOL, seed);
+    let states =
+        InitialStates::of_option(world, &option.option, option.option.guide.start(), STATE_POOL, seed);
     let task = LearningTask {
         world,
         conditions,
@@ -208,7 +214,8 @@ pub fn learn_hand_overs(
     monitor: &dyn BuildingMonitor,
     work: &mut BuildingWork,
 ) -> Result<(), FileError> {
-    let identities: Vec<Option<String>> = roster.options.iter().map(|option| known_identity(library, option)).collect();
+    let identities: Vec<Option<String>> =
+        roster.options.iter().map(|option| known_identity(library, option)).collect();
     let known = library.hand_overs_by_key();
     let (mut all, mut is_whole) = (Vec::with_capacity(roster.hand_overs.len()), true);
     for (unit, block) in roster.hand_overs.chunks(BLOCK).enumerate() {
@@ -272,7 +279,8 @@ impl Building {
         let pair = |one: &HandOver| (one.before, one.after);
         let here: BTreeSet<_> = self.hand_overs.iter().map(pair).collect();
         self.hand_overs.extend(before.hand_overs.iter().filter(|one| !here.contains(&pair(one))).cloned());
-        self.unguided.extend(before.unguided.iter().filter(|id| !self.unguided.contains(id)).collect::<Vec<_>>());
+        self.unguided
+            .extend(before.unguided.iter().filter(|id| !self.unguided.contains(id)).collect::<Vec<_>>());
         self
     }
 }
@@ -353,7 +361,13 @@ mod tests {
     }
 
     /// Learns a corridor into the folder of `map`.
-    fn learn(root: &Path, map: &str, pillar: bool, part: Part, monitor: &dyn BuildingMonitor) -> BuildingWork {
+    fn learn(
+        root: &Path,
+        map: &str,
+        pillar: bool,
+        part: Part,
+        monitor: &dyn BuildingMonitor,
+    ) -> BuildingWork {
         let (world, abstraction) = world(&corridor(pillar), OptionKind::Interface);
         let method = Method::fast().with_episodes(50, 50, 50);
         let conditions = Conditions::new(&world, NoiseModel::nominal());
@@ -376,7 +390,8 @@ mod tests {
 
     /// The files of a library, by name.
     fn files(root: &Path, map: &str) -> Vec<(String, Vec<u8>)> {
-        let entries = fs::read_dir(root.join(map)).expect("a folder").map(|entry| entry.expect("a file").path());
+        let entries =
+            fs::read_dir(root.join(map)).expect("a folder").map(|entry| entry.expect("a file").path());
         let name = |path: &Path| path.file_name().expect("a name").to_string_lossy().into_owned();
         let mut files: Vec<_> =
             entries.map(|path| (name(&path), fs::read(&path).expect("no folder is left"))).collect();
@@ -393,7 +408,9 @@ mod tests {
         let parts = [part(1), part(0), part(1)];
         assert!(!parts[0].is_whole && parts[2].is_whole, "{parts:?}");
         let mut stops = 0;
-        while !learn(root.path(), "y-1-stopped", false, Part::ALL, &StopAfter(AtomicUsize::new(stops))).is_whole {
+        while !learn(root.path(), "y-1-stopped", false, Part::ALL, &StopAfter(AtomicUsize::new(stops)))
+            .is_whole
+        {
             stops += 1;
             assert!(stops < 50, "it never ends");
         }

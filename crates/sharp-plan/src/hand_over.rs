@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sharp_drive::{
-    ChainRun, Driver, EpisodeEnd, InitialStates, OptionPolicy, StateSpread, SuccessCount, SuccessEstimate, World,
+    ChainRun, Driver, EpisodeEnd, InitialStates, OptionPolicy, StateSpread, SuccessCount, SuccessEstimate,
+    World,
 };
 use sharp_guide::{GuidedOption, join_guides};
 use sharp_options::OptionId;
@@ -28,8 +29,7 @@ const HALF_WIDTH: f64 = 0.0075;
 /// States in which the first option of a hand-over begins.
 const STATE_POOL: usize = 64;
 /// How they spread: as robots arrive there. They have half an option left to get onto the guide.
-const ARRIVING: StateSpread = 
-    StateSpread { radius_m: 0.15, heading_sd_rad: 0.15, speed_max_mps: 1.0 };
+const ARRIVING: StateSpread = StateSpread { radius_m: 0.15, heading_sd_rad: 0.15, speed_max_mps: 1.0 };
 /// Raised whenever hand-overs are measured in another way.
 const RULE: u32 = 3;
 /// Way that is driven before the first cut, metres.

@@ -44,7 +44,8 @@ impl KnownOptions {
         let pricer = Pricer::new(world, noise, method.search, method.failure_cost_s);
         // Options end at endpoints: this goal belongs to none of them.
         let goal = Goal::new(Point::origin(), world.robot.goal_tolerance_m, world.geometry.clearance());
-        let stored: Vec<_> = library.iter().filter(|(id, _)| abstraction.options.get(*id).is_some()).collect();
+        let stored: Vec<_> =
+            library.iter().filter(|(id, _)| abstraction.options.get(*id).is_some()).collect();
         let guided = stored.par_iter().map(|&(id, stored)| {
             let (leg, ends) = (LegId::Option(id), (id.from(), id.to()));
             let option = GuidedOption::new(&space, leg, ends, stored.guide.clone(), goal.clone());
@@ -53,10 +54,14 @@ impl KnownOptions {
         });
         let guided = guided.collect();
         let mut this = Self { guided, ..Self::default() };
-        let unguided = library.building(&fingerprint(&abstraction.options)).map(|building| &building.unguided);
-        this.unguided = unguided.into_iter().flatten().map(|&id| (LegId::Option(id), NoGuide::Unreachable)).collect();
-        let identities: BTreeMap<OptionId, String> =
-            stored.iter().map(|&(id, stored)| (id, identity(&stored.corridor, &stored.learnt.policy))).collect();
+        let unguided =
+            library.building(&fingerprint(&abstraction.options)).map(|building| &building.unguided);
+        this.unguided =
+            unguided.into_iter().flatten().map(|&id| (LegId::Option(id), NoGuide::Unreachable)).collect();
+        let identities: BTreeMap<OptionId, String> = stored
+            .iter()
+            .map(|&(id, stored)| (id, identity(&stored.corridor, &stored.learnt.policy)))
+            .collect();
         for HandOver { before, after, run_up, key, count, mean_time_s } in library.hand_overs() {
             let chain = run_up.iter().chain([before, after]).map(|id| identities.get(id).map(String::as_str));
             let is_current = chain.collect::<Option<Vec<_>>>().is_some_and(|chain| *key == chain_key(&chain));

@@ -87,5 +87,5 @@ pub use search::{Search, Unplaced};
 pub use sharp::{Answer, Sharp, SolveError};
 pub use tour::{Tour, TourPolicy, end_of};
 pub use training_route::{RouteScenarios, TrainingRoute, training_routes};
-pub use weak_places::{MeasuredStretch, WeakPlace, measured_stretches, weak_places};
 pub use verify::{PlannedOption, Solution};
+pub use weak_places::{MeasuredStretch, WeakPlace, measured_stretches, weak_places};

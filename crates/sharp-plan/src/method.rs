@@ -111,10 +111,12 @@ pub struct SearchSettings {
     pub bypasses: bool,
     /// A plan may also go from start to goal without any option, where that is cheaper; false keeps to the paper's.
     pub direct: bool,
-    /// Routes with different safety margins of which the cheapest is the direct way, at most.
+    /// Routes with different safety margins of which the cheapest is the direct way, at most; files do not keep it.
+    #[serde(skip)]
     pub direct_routes: usize,
     /// Legs without a guide are taken to be driven straight at this share of the top speed. 1 never overestimates, so that no
-    /// better plan is missed; less guides fewer legs.
+    /// better plan is missed; less guides fewer legs. Files do not keep it.
+    #[serde(skip)]
     pub unguided_speed: f64,
     /// Learnt options cost what was measured of them (line 17 of Algorithm 1); false keeps the first costs.
     pub cost_update: bool,

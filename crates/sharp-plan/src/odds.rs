@@ -73,8 +73,10 @@ impl ComposedOdds {
     pub fn of(pieces: Vec<Piece>) -> Self {
         let success: f64 = pieces.iter().map(|piece| piece.success).product();
         let time_s = pieces.iter().map(|piece| piece.time_s).sum();
-        let variance: f64 =
-            pieces.iter().map(|piece| (1.0 - piece.success) / (piece.success.max(1e-9) * piece.episodes)).sum();
+        let variance: f64 = pieces
+            .iter()
+            .map(|piece| (1.0 - piece.success) / (piece.success.max(1e-9) * piece.episodes))
+            .sum();
         let least = pieces.iter().map(|piece| piece.episodes).fold(f64::INFINITY, f64::min);
         let most = pieces.iter().map(|piece| piece.episodes).fold(0.0, f64::max);
         let told = (1.0 - success) / (success.max(1e-9) * variance);

@@ -80,7 +80,10 @@ impl Roster {
         let Abstraction { states, options } = abstraction;
         let anywhere = states.states().next().map_or(Point::origin(), |state| states.center(state));
         // The options of a building depend on no query; the search needs one all the same.
-        let query = Query { start: Pose::new(anywhere.x, anywhere.y, 0.0), goal: Pose::new(anywhere.x, anywhere.y, 0.0) };
+        let query = Query {
+            start: Pose::new(anywhere.x, anywhere.y, 0.0),
+            goal: Pose::new(anywhere.x, anywhere.y, 0.0),
+        };
         let fingerprint = fingerprint(options);
         let search = Search::new(world, abstraction, method, &conditions.noise, query, [], seed);
         let Ok(mut search) = search else {
@@ -150,9 +153,11 @@ fn ordered(
     order.sort_by_key(|&position| (Reverse(uses[position]), guided[position]));
     let mut rank = vec![0; guided.len()];
     order.iter().enumerate().for_each(|(new, &old)| rank[old] = new);
-    let guide = |position: usize| &search.option(LegId::Option(guided[position])).expect("it was guided").guide;
+    let guide =
+        |position: usize| &search.option(LegId::Option(guided[position])).expect("it was guided").guide;
     let lengths_m: Vec<f64> = (0..guided.len()).map(|position| guide(position).length_m()).collect();
-    let turn = |before: usize, after: usize| guide(before).end().heading.turn_to(guide(after).start().heading).abs();
+    let turn =
+        |before: usize, after: usize| guide(before).end().heading.turn_to(guide(after).start().heading).abs();
     let before = straightest(&next, turn);
     let entry = |&position: &usize| {
         let id = guided[position];
@@ -163,7 +168,8 @@ fn ordered(
     };
     let hand_overs =
         order.iter().enumerate().flat_map(|(new, &old)| next[old].iter().map(move |&after| (new, after)));
-    let mut hand_overs: Vec<(usize, usize)> = hand_overs.map(|(before, after)| (before, rank[after])).collect();
+    let mut hand_overs: Vec<(usize, usize)> =
+        hand_overs.map(|(before, after)| (before, rank[after])).collect();
     hand_overs.sort_unstable();
     Roster { fingerprint, options: order.iter().map(entry).collect(), unguided, hand_overs }
 }
@@ -172,7 +178,9 @@ fn ordered(
 /// It depends on the options nearby alone, so that a change of the map far away changes nothing.
 fn straightest(next: &[Vec<usize>], turn: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
     let mut best: Vec<Option<(f64, usize)>> = vec![None; next.len()];
-    for (before, after) in next.iter().enumerate().flat_map(|(before, next)| next.iter().map(move |&after| (before, after))) {
+    for (before, after) in
+        next.iter().enumerate().flat_map(|(before, next)| next.iter().map(move |&after| (before, after)))
+    {
         let angle = turn(before, after);
         if best[after].is_none_or(|(least, _)| angle < least) {
             best[after] = Some((angle, before));
@@ -185,7 +193,10 @@ fn straightest(next: &[Vec<usize>], turn: impl Fn(usize, usize) -> f64) -> Vec<O
 fn run_up(before: &[Option<usize>], lengths_m: &[f64], of: usize) -> Vec<usize> {
     let (mut chain, mut way_m, mut at) = (Vec::new(), 0.5 * lengths_m[of], of);
     while way_m < RUN_UP_M && chain.len() < RUN_UP_MAX {
-        let Some(previous) = before[at].filter(|previous| *previous != of && !chain.contains(previous)) else { break };
+        let Some(previous) = before[at].filter(|previous| *previous != of && !chain.contains(previous))
+        else {
+            break;
+        };
         chain.push(previous);
         way_m += lengths_m[previous];
         at = previous;

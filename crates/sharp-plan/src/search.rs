@@ -144,8 +144,7 @@ impl<'a> Search<'a> {
         loop {
             monitor.phase(Phase::Search);
             let (cost_s, ids) = self.cheapest(measured)?;
-            let missing: Vec<LegId> =
-                ids.iter().copied().filter(|&id| self.found(id).is_none()).collect();
+            let missing: Vec<LegId> = ids.iter().copied().filter(|&id| self.found(id).is_none()).collect();
             if missing.is_empty() {
                 let options: Option<_> = ids.iter().map(|&id| self.found(id)?.ok().cloned()).collect();
                 return options.map(|options| (cost_s, options));

@@ -54,7 +54,8 @@ pub fn measured_stretches(roster: &Roster, building: &Building) -> Vec<MeasuredS
         let is_late = |index: usize| first.arc_m(index) >= 0.5 * first.length_m();
         let is_early = |index: usize| second.arc_m(index) <= 0.5 * second.length_m();
         let late = (0..first.poses().len()).filter(|&index| is_late(index)).map(|index| first.poses()[index]);
-        let early = (0..second.poses().len()).filter(|&index| is_early(index)).map(|index| second.poses()[index]);
+        let early =
+            (0..second.poses().len()).filter(|&index| is_early(index)).map(|index| second.poses()[index]);
         let way = late.chain(early).map(|pose| pose.position).collect();
         let length_m = 0.5 * (first.length_m() + second.length_m());
         let speed_mps = if one.mean_time_s > 0.0 { length_m / one.mean_time_s } else { 0.0 };

@@ -60,7 +60,8 @@ impl LearnBar {
 
     /// One unit of `message` is done, which succeeded so often.
     fn note(&self, message: &str, count: sharp_drive::SuccessCount) {
-        let add = |sum: &AtomicU64, more: u32| sum.fetch_add(more.into(), Ordering::Relaxed) + u64::from(more);
+        let add =
+            |sum: &AtomicU64, more: u32| sum.fetch_add(more.into(), Ordering::Relaxed) + u64::from(more);
         let episodes = add(&self.episodes, count.episodes);
         let successes = add(&self.successes, count.successes);
         let share = 100.0 * successes as f64 / episodes.max(1) as f64;
@@ -88,7 +89,8 @@ impl BuildingMonitor for LearnBar {
 }
 
 fn print_report(report: &LearnReport) {
-    let LearnReport { robot, noise, map, options, learnt, new, adopted, unguided, pairs, new_pairs, .. } = report;
+    let LearnReport { robot, noise, map, options, learnt, new, adopted, unguided, pairs, new_pairs, .. } =
+        report;
     say!("{robot} on map {}, {noise} noise", map.name);
     say!("{learnt} of {options} options learnt, {} of them now, {adopted} as in another map", new.len());
     if *adopted > 0 && !new.is_empty() {
@@ -109,5 +111,9 @@ fn print_report(report: &LearnReport) {
         say!("  {:>5.1} %  {}", 100.0 * weak.success, weak.words);
     }
     say!("library: {}", report.library);
-    say!("took {:.1} s{}", report.time_s, if report.status == "whole" { "" } else { "; something is missing" });
+    say!(
+        "took {:.1} s{}",
+        report.time_s,
+        if report.status == "whole" { "" } else { "; something is missing" }
+    );
 }

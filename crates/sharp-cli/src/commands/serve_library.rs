@@ -55,7 +55,9 @@ pub(crate) fn run(args: &Serve, seed: u64) -> Result<Exit, Failure> {
     let (options, hand_overs) = dispatcher.known();
     eprintln!("{options} options and {hand_overs} hand-overs known; goals and poses as lines");
     if hand_overs == 0 {
-        eprintln!("warning: the library knows no hand-overs, sharp learn makes them; answers take longer without");
+        eprintln!(
+            "warning: the library knows no hand-overs, sharp learn makes them; answers take longer without"
+        );
     }
     let mut out = std::io::stdout().lock();
     for (index, line) in std::io::stdin().lock().lines().enumerate() {
