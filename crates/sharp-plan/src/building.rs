@@ -16,7 +16,7 @@ use sharp_space::Seed;
 use crate::abstraction::Abstraction;
 use crate::conditions::Conditions;
 use crate::files::FileError;
-use crate::hand_over::{Driven, HandOver, chain_key, drive_hand_over, identity};
+use crate::hand_over::{DrivenOption, HandOver, chain_key, drive_hand_over, identity};
 use crate::learn::{LearnFailure, LearningTask, LearntPolicy};
 use crate::library::{OptionLibrary, StoredOption};
 use crate::method::Method;
@@ -31,7 +31,7 @@ const STATE_POOL: usize = 128;
 
 /// Where and how options are learnt.
 #[derive(Clone, Copy, Debug)]
-pub struct Site<'a> {
+pub struct LearningSite<'a> {
     /// Map and robot.
     pub world: &'a World,
     /// The states and options of the map.
@@ -114,7 +114,7 @@ pub struct BuildingWork {
 /// # Errors
 /// If the library cannot be written.
 pub fn learn_options(
-    (site, roster): (&Site<'_>, &Roster),
+    (site, roster): (&LearningSite<'_>, &Roster),
     library: &mut OptionLibrary,
     part: Part,
     monitor: &dyn BuildingMonitor,
@@ -159,7 +159,7 @@ enum Obtained {
 }
 
 fn obtain(
-    site: &Site<'_>,
+    site: &LearningSite<'_>,
     library: &OptionLibrary,
     option: &RosterOption,
     monitor: &dyn BuildingMonitor,
@@ -173,7 +173,7 @@ fn obtain(
     if let Some(stored) = library.adopt(&option.corridor) {
         return Obtained::Adopted(stored.learnt);
     }
-    let Site { world, method, conditions, .. } = *site;
+    let LearningSite { world, method, conditions, .. } = *site;
     let seed = site.seed.child(&format!("option {}", option.corridor), 0);
     let states =
         InitialStates::of_option(world, &option.option, option.option.guide.start(), STATE_POOL, seed);
@@ -208,7 +208,7 @@ fn keep(library: &mut OptionLibrary, option: &RosterOption, learnt: LearntPolicy
 /// # Errors
 /// If the library cannot be read or written.
 pub fn learn_hand_overs(
-    (site, roster): (&Site<'_>, &Roster),
+    (site, roster): (&LearningSite<'_>, &Roster),
     library: &mut OptionLibrary,
     part: Part,
     monitor: &dyn BuildingMonitor,
@@ -237,10 +237,10 @@ pub fn learn_hand_overs(
             }
             let driven = |&position: &usize| {
                 let RosterOption { id, option, .. } = &roster.options[position];
-                Some(Driven { option, policy: &shared.get(*id)?.learnt.policy })
+                Some(DrivenOption { option, policy: &shared.get(*id)?.learnt.policy })
             };
             let driven = chain.iter().map(driven).collect::<Option<Vec<_>>>()?;
-            let Site { world, method, conditions, seed, .. } = *site;
+            let LearningSite { world, method, conditions, seed, .. } = *site;
             let seed = seed.child(&format!("hand-over {key}"), 0);
             let estimate = drive_hand_over((world, conditions, method), &driven, seed);
             Some((true, named(roster, chain, HandOver::new(key.clone(), estimate))))
@@ -371,7 +371,7 @@ mod tests {
         let (world, abstraction) = world(&corridor(pillar), OptionKind::Interface);
         let method = Method::fast().with_episodes(50, 50, 50);
         let conditions = Conditions::new(&world, NoiseModel::nominal());
-        let site = Site {
+        let site = LearningSite {
             world: &world,
             abstraction: &abstraction,
             method: &method,

@@ -85,7 +85,7 @@ pub(crate) fn chain_key(identities: &[&str]) -> String {
 
 /// An option with the policy that drives it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Driven<'a> {
+pub(crate) struct DrivenOption<'a> {
     pub(crate) option: &'a Arc<GuidedOption>,
     pub(crate) policy: &'a OptionPolicy,
 }
@@ -93,7 +93,7 @@ pub(crate) struct Driven<'a> {
 /// Drives from the middle of the last option but one of `chain` to the middle of the last.
 pub(crate) fn drive_hand_over(
     (world, conditions, method): (&World, &Conditions, &Method),
-    chain: &[Driven<'_>],
+    chain: &[DrivenOption<'_>],
     seed: Seed,
 ) -> SuccessEstimate {
     let mut options: Vec<_> = chain.iter().map(|driven| Arc::clone(driven.option)).collect();
@@ -105,12 +105,17 @@ pub(crate) fn drive_hand_over(
     let policies: Vec<&OptionPolicy> = chain.iter().map(|driven| driven.policy).collect();
     let cut = Some(chain.len() - 2);
     let stretch = Stretch { options: &options, policies: &policies, from_middle_of: cut, to_middle: true };
-    stretch.drive((world, conditions), &states, Budget { episodes: EPISODES, half_width: HALF_WIDTH }, seed)
+    stretch.drive(
+        (world, conditions),
+        &states,
+        RunBudget { episodes: EPISODES, half_width: HALF_WIDTH },
+        seed,
+    )
 }
 
 /// How many runs a stretch is worth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Budget {
+pub(crate) struct RunBudget {
     /// At least and at most.
     pub(crate) episodes: (u32, u32),
     /// Half the width of the 95 % interval at which counting ends between the two.
@@ -135,7 +140,7 @@ impl Stretch<'_> {
         &self,
         (world, conditions): (&World, &Conditions),
         states: &InitialStates,
-        budget: Budget,
+        budget: RunBudget,
         seed: Seed,
     ) -> SuccessEstimate {
         let legs = self.options.iter().zip(self.policies).enumerate();

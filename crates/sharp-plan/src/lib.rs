@@ -63,7 +63,9 @@ mod test_worlds;
 
 pub use abstraction::{Abstraction, AbstractionSettings, construct};
 pub use algorithm::{Outcome, solve};
-pub use building::{Building, BuildingMonitor, BuildingWork, Part, Site, learn_hand_overs, learn_options};
+pub use building::{
+    Building, BuildingMonitor, BuildingWork, LearningSite, Part, learn_hand_overs, learn_options,
+};
 pub use composed::{ComposedPolicy, Events};
 pub use conditions::Conditions;
 pub use execute::{Execution, RunSettings, run, success};
@@ -76,7 +78,7 @@ pub use learn::{
 };
 pub use library::{FORMAT, OptionLibrary, StoredOption};
 pub use method::{LearningOrder, Method, PriceRule, RepairSettings, SearchSettings};
-pub use odds::{ComposedOdds, Piece};
+pub use odds::{ComposedOdds, PlanPiece};
 pub use option_graph::{Candidate, OptionGraph};
 pub use plan_file::{AbstractionFile, Plan, map_hash};
 pub use problem::PlanningProblem;

@@ -12,7 +12,7 @@ use sharp_drive::{InitialStates, StateSpread, SuccessCount, SuccessEstimate, wil
 use sharp_guide::{GuidePath, GuidedOption, LegId, Role};
 use sharp_sim::RobotState;
 
-use crate::hand_over::{Budget, RUN_UP_M, Stretch};
+use crate::hand_over::{RUN_UP_M, RunBudget, Stretch};
 use crate::known::KnownOptions;
 use crate::policies::Policies;
 use crate::price::Pricer;
@@ -47,13 +47,13 @@ pub struct ComposedOdds {
     /// Runs of the whole plan that would tell as much.
     pub episodes: f64,
     /// The parts, in order: from the start to the middle of the first option, from there to the middle of the next, …
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<PlanPiece>,
 }
 
 /// A piece of a plan between two cuts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Piece {
+pub struct PlanPiece {
     /// Where it ends, in legs from the start of the plan: 2.5 is the middle of the third leg.
     pub until: f64,
     /// The chance to come through.
@@ -70,7 +70,7 @@ impl ComposedOdds {
     /// The interval is Wilson's for as many runs as would leave the same uncertainty: to first order the variance of the logarithm of
     /// a product is the sum of the factors' (1 - p) / (p n).
     #[must_use]
-    pub fn of(pieces: Vec<Piece>) -> Self {
+    pub fn of(pieces: Vec<PlanPiece>) -> Self {
         let success: f64 = pieces.iter().map(|piece| piece.success).product();
         let time_s = pieces.iter().map(|piece| piece.time_s).sum();
         let variance: f64 = pieces
@@ -106,7 +106,7 @@ impl ComposedOdds {
     }
 }
 
-impl Piece {
+impl PlanPiece {
     /// The nearest count of whole runs.
     pub(crate) fn count(&self) -> SuccessCount {
         nearest_count(self.success, self.episodes)
@@ -137,7 +137,7 @@ pub(crate) fn compose(
             _ => None,
         };
         pieces.push(match known {
-            Some(SuccessEstimate { count, mean_time_s }) if count.successes > 0 => Piece {
+            Some(SuccessEstimate { count, mean_time_s }) if count.successes > 0 => PlanPiece {
                 until: cut as f64 + 1.5,
                 success: count.rate(),
                 episodes: f64::from(count.episodes),
@@ -170,7 +170,7 @@ fn end_piece(
     plan: &[Arc<GuidedOption>],
     policies: &Policies<'_>,
     (from, to): (Option<usize>, usize),
-) -> Piece {
+) -> PlanPiece {
     let SuccessEstimate { count, mean_time_s } = drive(problem, plan, policies, (from, to));
     let (priced_s, success) = priced(problem, plan, (from, to));
     let weight = if count.failures() == 0 { PRICE_EPISODES } else { 0.0 };
@@ -178,7 +178,7 @@ fn end_piece(
     let success = (weight * success + f64::from(count.successes)) / episodes;
     let time_s = if count.successes >= TIMED_MIN { mean_time_s } else { priced_s };
     let until = if to < plan.len() { to as f64 + 0.5 } else { to as f64 };
-    Piece { until, success, episodes, time_s }
+    PlanPiece { until, success, episodes, time_s }
 }
 
 /// Drives a piece of `plan`, with a run-up.
@@ -202,12 +202,12 @@ fn drive(
     let policies: Vec<_> = options.iter().map(|leg| &policies.learnt(leg.id).policy).collect();
     let (from_middle_of, to_middle) = (from.map(|cut| cut - begin), to < plan.len());
     let stretch = Stretch { options: &options, policies: &policies, from_middle_of, to_middle };
-    let some = Budget { episodes: (EPISODES.0, EPISODES.0), half_width: 0.0 };
+    let some = RunBudget { episodes: (EPISODES.0, EPISODES.0), half_width: 0.0 };
     let some = stretch.drive((world, conditions), &states, some, seed);
     if some.count.failures() == 0 {
         return some;
     }
-    let more = Budget { episodes: (1, EPISODES.1), half_width: HALF_WIDTH };
+    let more = RunBudget { episodes: (1, EPISODES.1), half_width: HALF_WIDTH };
     stretch.drive((world, conditions), &states, more, seed.child("more", 0)).and(&some)
 }
 
@@ -257,8 +257,8 @@ fn priced(
 mod tests {
     use super::*;
 
-    fn piece(success: f64, episodes: f64) -> Piece {
-        Piece { until: 1.0, success, episodes, time_s: 5.0 }
+    fn piece(success: f64, episodes: f64) -> PlanPiece {
+        PlanPiece { until: 1.0, success, episodes, time_s: 5.0 }
     }
 
     #[test]
@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn what_is_left_shrinks_from_the_whole_to_nothing() {
-        let pieces = [1.5, 2.5, 4.0].map(|until| Piece { until, ..piece(0.9, 100.0) });
+        let pieces = [1.5, 2.5, 4.0].map(|until| PlanPiece { until, ..piece(0.9, 100.0) });
         let odds = ComposedOdds::of(pieces.to_vec());
         assert_eq!(odds.rest((0, 0.0)), (odds.success, odds.time_s), "all of it");
         let half_way = odds.rest((1, 0.5));

@@ -10,7 +10,7 @@ use sharp_rbvd::StateId;
 use sharp_space::{Point, Pose};
 
 use crate::abstraction::Abstraction;
-use crate::building::Site;
+use crate::building::LearningSite;
 use crate::files;
 use crate::hand_over::{RUN_UP_M, RUN_UP_MAX};
 use crate::policies::corridor;
@@ -75,8 +75,8 @@ impl Roster {
     ///
     /// Options past a centroid are part of it where the two options that they replace do not join.
     #[must_use]
-    pub fn new(site: &Site<'_>, within: Option<Area>) -> Self {
-        let Site { world, abstraction, method, conditions, seed } = *site;
+    pub fn new(site: &LearningSite<'_>, within: Option<Area>) -> Self {
+        let LearningSite { world, abstraction, method, conditions, seed } = *site;
         let Abstraction { states, options } = abstraction;
         let anywhere = states.states().next().map_or(Point::origin(), |state| states.center(state));
         // The options of a building depend on no query; the search needs one all the same.
@@ -132,7 +132,7 @@ fn joins(search: &Search<'_>, id: OptionId) -> bool {
 
 /// The roster of the options `guided`, the most used first.
 fn ordered(
-    site: &Site<'_>,
+    site: &LearningSite<'_>,
     search: &Search<'_>,
     (guided, unguided): (Vec<OptionId>, Vec<OptionId>),
     pairs: &[(OptionId, OptionId)],

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use crate::abstraction::{Abstraction, AbstractionSettings, construct};
 use crate::algorithm::{Outcome, solve_with};
-use crate::building::{BuildingMonitor, BuildingWork, Part, Site, learn_hand_overs, learn_options};
+use crate::building::{BuildingMonitor, BuildingWork, LearningSite, Part, learn_hand_overs, learn_options};
 use crate::conditions::Conditions;
 use crate::files::FileError;
 use crate::known::KnownOptions;
@@ -235,7 +235,7 @@ impl Sharp {
     ) -> Result<(Roster, BuildingWork), SolveError> {
         let abstraction = self.abstraction(&())?.clone();
         let Self { world, method, conditions, library, seed, .. } = self;
-        let site = Site { world, abstraction: &abstraction, method, conditions, seed: *seed };
+        let site = LearningSite { world, abstraction: &abstraction, method, conditions, seed: *seed };
         let roster = Roster::new(&site, within);
         monitor.planned(roster.options.len(), roster.hand_overs.len());
         let mut work = BuildingWork::default();

@@ -9,7 +9,7 @@ use sharp_sim::RobotState;
 use crate::known::KnownOptions;
 use crate::learn::LearntPolicy;
 use crate::method::Method;
-use crate::odds::{ComposedOdds, Piece, compose};
+use crate::odds::{ComposedOdds, PlanPiece, compose};
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Query;
@@ -132,7 +132,7 @@ pub(crate) fn predict(
     note_ends(plan, policies, &odds);
     let planned = |(index, option): (usize, &Arc<GuidedOption>)| {
         let learnt = policies.learnt(option.id).clone();
-        let is_in = |piece: &&Piece| piece.until > index as f64;
+        let is_in = |piece: &&PlanPiece| piece.until > index as f64;
         let piece = odds.pieces.iter().find(is_in).expect("pieces reach the goal");
         PlannedOption {
             option: Arc::clone(option),
