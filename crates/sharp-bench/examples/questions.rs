@@ -131,7 +131,7 @@ fn random_queries(place: &NamedWorld, count: usize) -> Vec<Query> {
         let mut pose = || {
             let x = rng.random_range(bounds.min.x..bounds.max.x);
             let y = rng.random_range(bounds.min.y..bounds.max.y);
-            Pose::new(x, y, rng.random_range(-3.14..3.14))
+            Pose::new(x, y, rng.random_range(-std::f64::consts::PI..std::f64::consts::PI))
         };
         let query = Query { start: pose(), goal: pose() };
         let is_far = query.start.distance_m(&query.goal) >= least_m;
