@@ -34,10 +34,12 @@ mod baselines;
 mod contender;
 mod curves;
 mod data_uri;
+mod dispatch;
 mod error;
 mod evaluation;
 mod jobs;
 mod json;
+mod learn;
 mod measure;
 mod prior;
 mod reports;
@@ -57,6 +59,7 @@ mod tests;
 pub use baselines::{FlatSac, Mpc, RoutePlanner, Rrt, SacBudget, Track};
 pub use contender::{ComparisonSettings, Composed, Contender, Driven, compare};
 pub use curves::CurveFolder;
+pub use dispatch::{DispatchLine, DispatchReply, Dispatcher, Odds};
 pub use error::BenchError;
 pub use evaluation::{ReportError, ReportInput, table, totals, write_report};
 pub use jobs::{
@@ -65,6 +68,7 @@ pub use jobs::{
     count_results, merge, run_job, unfinished,
 };
 pub use json::to_json;
+pub use learn::{BuildingSuccess, LearnReport, LearntBuilding, NamedWorld, WeakReport, learn};
 pub use measure::{BaselineKind, BaselineSettings, MeasureMonitor, measure};
 pub use named::{InputError, NamedProblem};
 pub use prior::{

@@ -29,6 +29,12 @@ pub fn regions(grid: &OccupancyGrid, criticality: &[f32], regions: &[Region]) ->
     Scene::new(grid).heat_map(criticality, "criticality").regions(regions).to_svg()
 }
 
+/// A field over the free cells, called `name`; light where it is low or unknown.
+#[must_use]
+pub fn field(grid: &OccupancyGrid, field: &[f32], name: &str) -> String {
+    Scene::new(grid).heat_map(field, name).to_svg()
+}
+
 /// The regions of all states.
 #[must_use]
 pub fn regions_of(states: &dyn StateAbstraction) -> Vec<Region> {

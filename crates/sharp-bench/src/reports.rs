@@ -4,7 +4,7 @@
 use serde::Serialize;
 use sharp_drive::{EpisodeEnd, EpisodeRecord, SuccessCount};
 use sharp_guide::Role;
-use sharp_plan::{Execution, Plan, PlannedOption};
+use sharp_plan::{Execution, Plan, PlannedOption, Solution};
 use sharp_space::OccupancyGrid;
 
 use crate::times::{DecisionTimes, Reuse, SolveTimes};
@@ -120,9 +120,9 @@ impl OptionReport {
 /// What a plan says of itself.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Predicted {
-    /// What it was counted on: `runs` of the whole plan.
+    /// What it was counted on: `runs` of the whole plan, or `composed` of what its parts are known to hold.
     pub basis: &'static str,
-    /// How many.
+    /// How many runs; composed, as many as would tell as much.
     pub episodes: u32,
     /// Probability of success.
     pub success: f64,
@@ -130,6 +130,23 @@ pub struct Predicted {
     pub lower95: f64,
     /// Mean simulated time of a success, seconds.
     pub sim_time_s: f64,
+}
+
+impl Predicted {
+    fn of(solution: &Solution) -> Self {
+        let Solution { predicted, predicted_time_s, composed, .. } = solution;
+        let (success, lower95) = match composed {
+            Some(odds) => (odds.success, odds.lower95),
+            None => (predicted.rate(), predicted.lower95()),
+        };
+        Self {
+            basis: if composed.is_some() { "composed" } else { "runs" },
+            episodes: predicted.episodes,
+            success,
+            lower95,
+            sim_time_s: *predicted_time_s,
+        }
+    }
 }
 
 /// One of several goals in a row.
@@ -203,13 +220,7 @@ impl SolveReport {
             status: "solved",
             plan: OptionReport::all(plan),
             reuse: Reuse { uses, reused },
-            predicted: Some(Predicted {
-                basis: "runs",
-                episodes: solution.predicted.episodes,
-                success: solution.predicted.rate(),
-                lower95: solution.predicted.lower95(),
-                sim_time_s: solution.predicted_time_s,
-            }),
+            predicted: Some(Predicted::of(solution)),
             ..self
         }
     }

@@ -86,14 +86,7 @@ pub fn solve(
         .with_seed(Seed(*seed));
     let answer = sharp.solve(*query, monitor)?;
     let report = blank_report(problem, settings, &mut sharp, &file)?;
-    let (report, plan) = match answer {
-        Answer::Solved(plan) => (report.with_plan(&plan), Some(*plan)),
-        Answer::NoPlan(reason) => (SolveReport { reason: Some(reason), ..report }, None),
-        Answer::Stopped => {
-            let reason = "stopped before a plan was verified; what was learnt is kept".to_owned();
-            (SolveReport { status: "timeout", reason: Some(reason), ..report }, None)
-        }
-    };
+    let (report, plan) = answered(report, answer);
     monitor.phase(Phase::Done);
     let report = SolveReport { time_s: monitor.times(), ..report };
     Ok(Solved { report, plan, sharp, file })
@@ -139,7 +132,19 @@ impl AbstractionRequest {
     }
 }
 
-fn blank_report(
+/// `report` with what `answer` says.
+pub(crate) fn answered(report: SolveReport, answer: Answer) -> (SolveReport, Option<Plan>) {
+    match answer {
+        Answer::Solved(plan) => (report.with_plan(&plan), Some(*plan)),
+        Answer::NoPlan(reason) => (SolveReport { reason: Some(reason), ..report }, None),
+        Answer::Stopped => {
+            let reason = "stopped before a plan was verified; what was learnt is kept".to_owned();
+            (SolveReport { status: "timeout", reason: Some(reason), ..report }, None)
+        }
+    }
+}
+
+pub(crate) fn blank_report(
     problem: &NamedProblem,
     settings: &SolveSettings,
     sharp: &mut Sharp,

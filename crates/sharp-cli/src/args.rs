@@ -1,5 +1,6 @@
 //! What a user may type: one definition feeds parsing and help.
 
+mod learn;
 mod problem;
 mod robots;
 mod suites;
@@ -11,6 +12,7 @@ use sharp_bench::{AbstractionRequest, BaselineKind, BaselineSettings};
 use sharp_options::OptionKind;
 use sharp_rbvd::CellMetric;
 
+pub(crate) use learn::Learn;
 pub(crate) use problem::{ProblemArgs, SpeedArgs};
 pub(crate) use robots::{DriveName, Robots};
 pub(crate) use suites::{EngineName, Eval, Jobs, Submit, SuiteArgs};
@@ -37,6 +39,8 @@ pub(crate) struct Cli {
 pub(crate) enum Subcommands {
     /// Solve a path planning problem: regions, abstraction, search, learning, a policy on disk.
     Solve(Box<Solve>),
+    /// Learn every option of a building ahead of time, so that later problems are answered at once.
+    Learn(Learn),
     /// Run a solved plan in a simulator and count how often it holds.
     Run(Run),
     /// Write a plan in a format that others read: tables, MCAP, route graphs, networks.
@@ -221,7 +225,7 @@ pub(crate) struct Solve {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Runs of the whole plan that its predicted success is counted on; auto stops as soon as the 95 % interval is two
-    /// points wide, at the latest after 1000.
+    /// points wide, at the latest after 1000; 0 composes it of what the library knows of options and hand-overs.
     #[arg(long, default_value = "auto", value_name = "N|auto")]
     pub(crate) verify: String,
     /// Stop after so many seconds of wall time, with the best plan so far; what was learnt is kept.
@@ -331,8 +335,20 @@ pub(crate) struct Export {
 
 #[derive(Debug, Args)]
 pub(crate) struct Serve {
-    /// The folder that `sharp solve` wrote.
-    pub(crate) plan_dir: PathBuf,
+    /// The folder that `sharp solve` wrote; with --library a map, in which goals come as lines.
+    #[arg(value_name = "PLAN_DIR|MAP")]
+    pub(crate) place: String,
+    /// A library that `sharp learn` filled: goals come as lines, and the first argument is the map.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) library: Option<PathBuf>,
+    /// With --library: metres a cell, for maps that do not say.
+    #[arg(long, value_name = "M", requires = "library")]
+    pub(crate) resolution: Option<f64>,
+    #[command(flatten)]
+    pub(crate) abstraction: AbstractionArgs,
+    /// With --library: none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
+    #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
+    pub(crate) noise: String,
 }
 
 #[derive(Debug, Args)]

@@ -40,8 +40,10 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
     }
     match &cli.command {
         Subcommands::Solve(args) => commands::solve::run(args, cli.seed, cli.json),
+        Subcommands::Learn(args) => commands::learn::run(args, cli.seed, cli.json),
         Subcommands::Run(args) => commands::run::run(args, cli.seed, cli.json),
         Subcommands::Export(args) => commands::export::run(args, cli.json),
+        Subcommands::Serve(args) if args.library.is_some() => commands::serve_library::run(args, cli.seed),
         Subcommands::Serve(args) => commands::serve::run(args),
         Subcommands::Abstract(args) => commands::abstraction::run(args, cli.seed, cli.json),
         Subcommands::Regions(command) => commands::regions::run(command, cli.seed, cli.json),

@@ -380,6 +380,77 @@ fn serve_answers_every_line() {
 }
 
 #[test]
+fn a_learnt_building_answers_solves_and_serves() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    fs::write(folder.path().join("places.ron"), "[(2.0, 3.0), (6.1, 3.1), (10.0, 3.0)]").unwrap();
+    let kind = ["--options", "centroid", "--regions", "places.ron", "--library", "lib"];
+    let learn = [&["--json", "learn", "rooms.yaml", "--out", "pictures"], &kind[..]].concat();
+    let output = sharp(folder.path(), &learn);
+    let report = json(&output);
+    assert_eq!((output.status.code(), &report["status"]), (Some(0), &"whole".into()), "{report}");
+    assert_eq!(report["learnt"], report["options"], "{report}");
+    assert!(report["pairs"].as_u64() > Some(0) && report["success"]["mean"].as_f64() > Some(0.8), "{report}");
+    assert!(
+        ["success.png", "speed.png"].iter().all(|name| folder.path().join("pictures").join(name).exists())
+    );
+    let again = json(&sharp(folder.path(), &learn));
+    assert_eq!((again["new"].as_array().map(Vec::len), &again["new_pairs"]), (Some(0), &0.into()), "{again}");
+
+    let problem = ["--start", "2.0,3.0,0.0", "--goal", "10.0,3.5,0.0", "--verify", "0", "--out", "plan"];
+    let solved =
+        json(&sharp(folder.path(), &[&["--json", "solve", "rooms.yaml"], &problem[..], &kind[..]].concat()));
+    assert_eq!(solved["predicted"]["basis"], "composed", "{solved}");
+    assert_eq!(solved["reuse"]["uses"], solved["reuse"]["reused"], "{solved}");
+    assert!(solved["predicted"]["success"].as_f64() > Some(0.8), "{solved}");
+
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sharp"))
+        .args(["serve", "rooms.yaml"])
+        .args(kind)
+        .current_dir(folder.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = concat!(
+        "{\"goal\":[10.0,3.5]}\n{\"pose\":[2.0,3.0,0.0]}\nnonsense\n{\"pose\":[2.3,3.0,0.0],\"speed\":0.6}\n",
+        "{\"goal\":[6.1,0.5]}\n{\"pose\":[2.5,3.0,0.0]}\n{\"route\":[[4.0,5.0],[10.0,5.0]]}\n{\"pose\":[-3.0,0.0,0.0]}\n",
+        "{\"cancel\":true}\n{\"pose\":[2.5,3.0,0.0]}\n"
+    );
+    child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let said: Vec<Value> = String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let words: Vec<&str> = said
+        .iter()
+        .map(|line| {
+            line["plan"]["status"].as_str().or(line["status"].as_str()).or(line["schema"].as_str()).unwrap()
+        })
+        .collect();
+    let expected = [
+        "waiting_for_pose",
+        "solved",
+        "running",
+        "sharp.error/1",
+        "running",
+        "no_plan",
+        "no_plan",
+        "solved",
+        "solved",
+        "lost",
+        "cancelled",
+        "no_plan",
+    ];
+    assert_eq!(words, expected, "{said:?}");
+    assert!(said[5]["plan"]["reason"].as_str().unwrap().contains("goal"), "{}", said[5]);
+    assert!(said[2]["odds"]["success"].as_f64() > Some(0.8), "{}", said[2]);
+    let left = |line: usize| said[line]["odds"]["time_s"].as_f64().unwrap();
+    assert!(left(4) <= left(2), "less is left later: {} and {}", said[2], said[4]);
+}
+
+#[test]
 fn regions_are_scored_at_the_doors_of_a_map() {
     let folder = tempfile::tempdir().unwrap();
     write_rooms(folder.path(), true);

@@ -53,6 +53,8 @@ pub struct Visit {
     pub entry: RobotState,
     /// Simulated time since then, seconds.
     pub time_s: f64,
+    /// The part of it until the middle of the guide was passed, seconds; `None` before that.
+    pub half_s: Option<f64>,
 }
 
 /// The state of a chain of options that is being executed.
@@ -152,7 +154,11 @@ impl Automaton {
             // Who has backed off may be at another place of the guide than its window shows.
             None => self.progress = GuideProgress::start(guide, pose),
         }
-        self.visits[index].time_s += motion.time_s;
+        let visit = &mut self.visits[index];
+        visit.time_s += motion.time_s;
+        if visit.half_s.is_none() && self.progress.arc_m >= 0.5 * guide.length_m() {
+            visit.half_s = Some(visit.time_s);
+        }
         self.actions += 1;
         if let Some(limits) = &world.speed_limits {
             self.spared += 1.0 - limits.counts(motion.after.pose.position);
@@ -188,7 +194,7 @@ impl Automaton {
         let state = self.observation.state;
         let guide = &self.links[self.visits.len()].option.guide;
         self.progress = GuideProgress::start(guide, &state.pose);
-        self.visits.push(Visit { entry: state, time_s: 0.0 });
+        self.visits.push(Visit { entry: state, time_s: 0.0, half_s: None });
         (self.actions, self.spared) = (0, 0.0);
     }
 }

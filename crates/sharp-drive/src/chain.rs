@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn an_option_counts_as_passed_only_if_the_next_was_entered_or_the_goal_reached() {
         let arrival = RobotState::at_rest(Pose::new(0.0, 0.0, 0.0));
-        let visits = vec![Visit { entry: arrival, time_s: 1.0 }; 2];
+        let visits = vec![Visit { entry: arrival, time_s: 1.0, half_s: None }; 2];
         for (end, passed) in
             [(EpisodeEnd::Reached, [true, true, false]), (EpisodeEnd::Collided, [true, false, false])]
         {

@@ -57,18 +57,26 @@ impl SuccessCount {
         0.5 * (upper - lower)
     }
 
-    /// E. B. Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", 1927.
     fn wilson(&self) -> (f64, f64) {
-        if self.episodes == 0 {
-            return (0.0, 1.0);
-        }
-        let (n, p) = (f64::from(self.episodes), self.rate());
-        let z2 = Z_95 * Z_95;
-        let center = p + z2 / (2.0 * n);
-        let half = Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
-        let scale = 1.0 + z2 / n;
-        (((center - half) / scale).max(0.0), ((center + half) / scale).min(1.0))
+        wilson95(self.rate(), f64::from(self.episodes))
     }
+}
+
+/// The 95 % Wilson score interval of a share `rate` that was counted on `episodes` trials, which need not be a whole number;
+/// from 0 to 1 without any.
+///
+/// E. B. Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", 1927.
+#[must_use]
+pub fn wilson95(rate: f64, episodes: f64) -> (f64, f64) {
+    if episodes <= 0.0 {
+        return (0.0, 1.0);
+    }
+    let (n, p) = (episodes, rate);
+    let z2 = Z_95 * Z_95;
+    let center = p + z2 / (2.0 * n);
+    let half = Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
+    let scale = 1.0 + z2 / n;
+    (((center - half) / scale).max(0.0), ((center + half) / scale).min(1.0))
 }
 
 #[cfg(test)]

@@ -38,6 +38,23 @@ impl SuccessEstimate {
         Self { count, mean_time_s }
     }
 
+    /// The estimate of all episodes of both.
+    #[must_use]
+    pub fn and(&self, other: &Self) -> Self {
+        let total_s = |of: &Self| {
+            if of.count.successes == 0 { 0.0 } else { f64::from(of.count.successes) * of.mean_time_s }
+        };
+        let count = SuccessCount {
+            episodes: self.count.episodes + other.count.episodes,
+            successes: self.count.successes + other.count.successes,
+        };
+        let mean_time_s = match count.successes {
+            0 => f64::INFINITY,
+            successes => (total_s(self) + total_s(other)) / f64::from(successes),
+        };
+        Self { count, mean_time_s }
+    }
+
     /// The expected cost of a use, seconds: mean time per success, and `failure_cost_s` for each failure.
     #[must_use]
     pub fn cost_s(&self, failure_cost_s: f64) -> f64 {
@@ -132,7 +149,28 @@ impl<'a> MonteCarlo<'a> {
         })
     }
 
-    /// The same, but stops after a block of runs as soon as `is_enough` of all so far.
+    /// Runs the chain of `drivers` from `states`, as often as asked for, and stops after a block of runs as soon as
+    /// `is_enough` of all so far.
+    #[must_use]
+    pub fn runs_from(
+        &self,
+        drivers: &[Driver<'_>],
+        states: &InitialStates,
+        is_enough: impl Fn(&[ChainRun]) -> bool,
+    ) -> Vec<ChainRun> {
+        let mut runs = Vec::with_capacity(self.episodes as usize);
+        while runs.len() < self.episodes as usize && (runs.is_empty() || !is_enough(&runs)) {
+            let next = runs.len() as u32;
+            let block = next..self.episodes.min(next + BLOCK);
+            runs.extend(self.parallel(drivers, block, |chain, episode, number| {
+                let start = states.draw(&mut self.seed.stream("trial start", number));
+                chain.run(self.world, episode, start, (self.seed, number))
+            }));
+        }
+        runs
+    }
+
+    /// The same from `start`.
     #[must_use]
     pub fn runs_until(
         &self,

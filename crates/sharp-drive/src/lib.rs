@@ -61,7 +61,7 @@ pub use automaton::{Automaton, Link, Visit};
 pub use chain::{ChainRun, Driver};
 pub use command::Command;
 pub use cost::{CostModel, DriveRow, GuideEnds, PredictedCost, RiskSamples, TimeSamples, drive_rows};
-pub use count::SuccessCount;
+pub use count::{SuccessCount, wilson95};
 pub use departure::CAREFUL_MPS;
 pub use episode::{
     Controller, Decision, Episode, EpisodeEnd, EpisodeRecord, EpisodeRules, Motion, Readiness, Supervisor,

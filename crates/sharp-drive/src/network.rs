@@ -167,6 +167,12 @@ impl NetworkPolicy {
         Self::shared(interface, actor, deployed)
     }
 
+    /// The same network with another interface of the same number of inputs.
+    #[must_use]
+    pub fn with_interface(&self, interface: PolicyInterface) -> Self {
+        Self { interface, ..self.clone() }
+    }
+
     /// The policy of `actor`, which `deployed` is made of.
     pub(crate) fn shared(
         interface: PolicyInterface,

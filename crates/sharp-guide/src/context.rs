@@ -84,11 +84,14 @@ impl<'a> GuideContext<'a> {
         self.first_path(&self.mask(margin_m), self.settings.clearance_weight)
     }
 
-    /// A guide along the ridge of clearance.
-    pub(crate) fn ridge_guide(&self, attempt: &Attempt) -> Result<GuidePath, NoGuide> {
-        let mask = self.mask(attempt.margin_m);
-        let points = self.first_path(&mask, attempt.weight)?;
-        self.smooth_guide(&mask, (&points, &[]), attempt)
+    /// The way along the ridge of clearance, as points in the grid.
+    pub(crate) fn ridge_way(&self, attempt: &Attempt) -> Option<Vec<Vector>> {
+        self.first_path(&self.mask(attempt.margin_m), attempt.weight).ok()
+    }
+
+    /// A guide along `way`.
+    pub(crate) fn ridge_guide(&self, way: &[Vector], attempt: &Attempt) -> Result<GuidePath, NoGuide> {
+        self.smooth_guide(&self.mask(attempt.margin_m), (way, &[]), attempt)
     }
 
     /// Smooths `points` into a path that meets all `discs` (centre and radius, metres), leads the robot onto

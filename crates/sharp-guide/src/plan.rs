@@ -26,8 +26,19 @@ pub(crate) fn plan_guide(
     let context = GuideContext::new(request, robot, settings);
     context.has_length()?;
     if settings.planner == PlannerKind::ClearanceSearch {
-        for attempt in attempts(settings, robot.geometry.clearance().frame().resolution_m) {
-            if let Ok(guide) = context.ridge_guide(&attempt) {
+        let attempts = attempts(settings, robot.geometry.clearance().frame().resolution_m);
+        // Attempts that differ in the smoothing only share their way, and where one finds none, none does.
+        let mut found: Option<(Attempt, Option<Vec<Vector>>)> = None;
+        for attempt in attempts {
+            let is_same = |(before, way): &(Attempt, Option<Vec<Vector>>)| {
+                before.margin_m == attempt.margin_m && (before.weight == attempt.weight || way.is_none())
+            };
+            if !found.as_ref().is_some_and(is_same) {
+                found = Some((attempt, context.ridge_way(&attempt)));
+            }
+            let way = found.as_ref().and_then(|(_, way)| way.as_deref());
+            let guide = way.and_then(|way| context.ridge_guide(way, &attempt).ok());
+            if let Some(guide) = guide {
                 return Ok(guide);
             }
         }

@@ -8,10 +8,11 @@
 use std::sync::Arc;
 
 use sharp_drive::SuccessEstimate;
-use sharp_guide::{GuidedOption, LegId, join_guides};
+use sharp_guide::{GuideRobot, GuidedOption, LegId, Role, join_guides};
 
 use crate::abstraction::Abstraction;
 use crate::files::FileError;
+use crate::known::KnownOptions;
 use crate::learn::learn_missing;
 use crate::library::OptionLibrary;
 use crate::policies::Policies;
@@ -20,12 +21,14 @@ use crate::query::Phase;
 use crate::reason::{is_joined, obstruction};
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
-use crate::verify::{PlannedOption, Solution, verify};
+use crate::verify::{PlannedOption, Solution, predict, verify};
 
 /// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
 /// Plans run from end to end before the best of them is taken.
 const VERIFIED_MAX: usize = 4;
+/// The same where odds are composed.
+const COMPOSED_MAX: usize = 2;
 
 /// How solving ended.
 #[derive(Debug)]
@@ -47,7 +50,30 @@ pub fn solve(
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
 ) -> Result<Outcome, FileError> {
-    let outcome = algorithm_1(problem, abstraction, library);
+    let PlanningProblem { world, method, conditions, .. } = *problem;
+    let known = KnownOptions::new(world, abstraction, method, &conditions.noise, library);
+    solve_with(problem, abstraction, library, &Arc::new(known))
+}
+
+/// The same, where `known` was made of the library beforehand, for this abstraction and method.
+///
+/// # Errors
+/// Returns an error if the library cannot be written.
+pub(crate) fn solve_with(
+    problem: &PlanningProblem<'_>,
+    abstraction: &Abstraction,
+    library: &mut OptionLibrary,
+    known: &Arc<KnownOptions>,
+) -> Result<Outcome, FileError> {
+    let outcome = algorithm_1(problem, abstraction, library, known);
+    let patient = problem.method.patient();
+    let outcome = match (outcome, &patient) {
+        // What quick guides cannot reach may be reached by manoeuvring.
+        (Ok(Outcome::NoPlan(_)), Some(method)) => {
+            algorithm_1(&PlanningProblem { method, ..*problem }, abstraction, library, known)
+        }
+        (outcome, _) => outcome,
+    };
     problem.monitor.phase(Phase::Done);
     outcome
 }
@@ -57,13 +83,15 @@ fn algorithm_1(
     problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
+    known: &Arc<KnownOptions>,
 ) -> Result<Outcome, FileError> {
     let PlanningProblem { world, method, conditions, query, seed, monitor } = *problem;
     monitor.phase(Phase::Search);
     // 8: s_i, s_g <- get_abstract_states(x_i, x_g)
-    let known = Policies::guides(library);
-    let mut search = match Search::new(world, abstraction, method, &conditions.noise, query, known, seed) {
-        Ok(search) => search.with_trials(conditions),
+    let mut search = match Search::new(world, abstraction, method, &conditions.noise, query, [], seed) {
+        // Composed odds are for those in a hurry: there a tight start is left by its price.
+        Ok(search) if method.verify_episodes == 0 => search.with_known(Arc::clone(known)),
+        Ok(search) => search.with_known(Arc::clone(known)).with_trials(conditions),
         Err(unplaced) => return Ok(Outcome::NoPlan(describe(problem, &unplaced.to_string()))),
     };
     let mut policies = Policies::new(library);
@@ -92,23 +120,34 @@ fn algorithm_1(
             let other = cheapest(problem, search, policies).filter(|(_, other)| names(other) != names(&p));
             other.map_or(f64::INFINITY, |(seconds, _)| seconds)
         };
-        if has_weak_option(problem, &p, &policies) && other_s(&mut search, &policies).is_finite() {
+        let is_composed = method.verify_episodes == 0;
+        if !is_composed
+            && has_weak_option(problem, &p, &policies)
+            && other_s(&mut search, &policies).is_finite()
+        {
             continue;
         }
         // Beyond the paper: Pi is repaired and measured, and the search looks again while another plan seems cheaper.
         monitor.phase(Phase::Verify);
-        let is_stopped = !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)?;
-        let solution = verify(problem, &p, &policies);
+        let is_stopped =
+            !is_composed && !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)?;
+        let solution = match is_composed {
+            true => predict(problem, &p, &mut policies, known),
+            false => verify(problem, &p, &policies),
+        };
         verified += 1;
-        search.offer_direct();
+        // Answers at once leave the direct way, which takes long to guide and to drive, for where there is no other.
+        if !is_composed {
+            search.offer_direct();
+        }
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
-        let cost_s = |solution: &Solution| solution.estimate().cost_s(method.failure_cost_s);
+        let cost_s = |solution: &Solution| solution.cost_s(method.failure_cost_s);
         if best.as_ref().is_none_or(|best| cost_s(&solution) < cost_s(best)) {
             best = Some(solution);
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
         if is_stopped
-            || verified == VERIFIED_MAX
+            || verified == if is_composed { COMPOSED_MAX } else { VERIFIED_MAX }
             || best_s <= method.retry_above * other_s(&mut search, &policies)
         {
             break;
@@ -140,7 +179,22 @@ fn join(problem: &PlanningProblem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<
         return plan;
     }
     let robot = problem.world.guide_robot();
-    join_guides(plan, problem.query.start, &robot, &problem.method.search.guide)
+    let (start, settings) = (problem.query.start, &problem.method.search.guide);
+    if problem.method.verify_episodes > 0 {
+        return join_guides(plan, start, &robot, settings);
+    }
+    // What is composed must drive as it was measured: a start or goal with little room must not take the safety margin from
+    // the options between. So either the whole plan is joined with the full margin, or its options alone.
+    let widest = GuideRobot { inflated: &robot.inflated[..robot.inflated.len().min(1)], ..robot };
+    let joined = join_guides(plan.clone(), start, &widest, settings);
+    if joined.iter().zip(&plan).any(|(joined, alone)| !Arc::ptr_eq(joined, alone)) {
+        return joined;
+    }
+    let is_option = |leg: &Arc<GuidedOption>| leg.id.role() == Role::Option;
+    let options: Vec<_> = plan.iter().filter(|leg| is_option(leg)).cloned().collect();
+    let Some(start) = options.first().map(|first| first.guide.start()) else { return plan };
+    let mut options = join_guides(options, start, &robot, settings).into_iter();
+    plan.into_iter().map(|leg| if is_option(&leg) { options.next().unwrap_or(leg) } else { leg }).collect()
 }
 
 fn has_weak_option(

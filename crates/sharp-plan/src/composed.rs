@@ -100,6 +100,13 @@ impl ComposedPolicy {
         self.events
     }
 
+    /// How far it is: the number of the leg that runs, from 0, and the share of its guide that is driven.
+    #[must_use]
+    pub fn progress(&self) -> (usize, f64) {
+        let share = self.automaton.progress().arc_m / self.option().guide.length_m();
+        (self.automaton.index(), share.clamp(0.0, 1.0))
+    }
+
     /// Returns true if the last decision came with a new plan.
     #[must_use]
     pub const fn is_recovering(&self) -> bool {

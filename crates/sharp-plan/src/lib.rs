@@ -30,13 +30,17 @@ pub mod conformance;
 
 mod abstraction;
 mod algorithm;
+mod building;
 mod composed;
 mod conditions;
 mod execute;
 mod files;
+mod hand_over;
+mod known;
 mod learn;
 mod library;
 mod method;
+mod odds;
 mod option_graph;
 mod plan_file;
 mod policies;
@@ -47,35 +51,45 @@ mod reason;
 mod recording;
 mod remote;
 mod repair;
+mod roster;
 mod search;
 mod sharp;
 mod tour;
 mod training_route;
 mod verify;
+mod weak_places;
 
 #[cfg(test)]
 mod test_worlds;
 
 pub use abstraction::{Abstraction, AbstractionSettings, construct};
 pub use algorithm::{Outcome, solve};
+pub use building::{
+    Building, BuildingMonitor, BuildingWork, LearningSite, Part, learn_hand_overs, learn_options,
+};
 pub use composed::{ComposedPolicy, Events};
 pub use conditions::Conditions;
 pub use execute::{Execution, RunSettings, run, success};
 pub use files::{FileError, hash, read_ron, write_atomic, write_ron};
+pub use hand_over::HandOver;
+pub use known::KnownOptions;
 pub use learn::{
     LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner, PaperProtocol, PriorOnly,
     Selection,
 };
 pub use library::{FORMAT, OptionLibrary, StoredOption};
 pub use method::{LearningOrder, Method, PriceRule, RepairSettings, SearchSettings};
+pub use odds::{ComposedOdds, PlanPiece};
 pub use option_graph::{Candidate, OptionGraph};
 pub use plan_file::{AbstractionFile, Plan, map_hash};
 pub use problem::PlanningProblem;
 pub use query::{Monitor, Phase, Query, QueryError};
 pub use recording::{Moment, Recording, record};
 pub use remote::{Instruction, Reading, RemoteDriver, RemoteStatus};
+pub use roster::{Area, Roster, RosterOption};
 pub use search::{Search, Unplaced};
 pub use sharp::{Answer, Sharp, SolveError};
 pub use tour::{Tour, TourPolicy, end_of};
 pub use training_route::{RouteScenarios, TrainingRoute, training_routes};
 pub use verify::{PlannedOption, Solution};
+pub use weak_places::{MeasuredStretch, WeakPlace, measured_stretches, weak_places};

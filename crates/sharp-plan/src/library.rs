@@ -8,7 +8,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
 use sharp_drive::{
@@ -20,13 +20,17 @@ use sharp_options::OptionId;
 use sharp_rl::Actor;
 use sharp_sim::{NoiseModel, SimulatorKind};
 
+use crate::building::{BUILDING_FORMAT, Building};
 use crate::files::{self, FileError};
+use crate::hand_over::HandOver;
 use crate::learn::LearntPolicy;
 use crate::method::Method;
 use crate::plan_file::map_hash;
 
 /// Raised whenever the files change their meaning.
 pub const FORMAT: u32 = 6;
+/// How the names of files of whole buildings begin.
+const BUILDING: &str = "building-";
 
 /// A policy as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,10 +66,21 @@ impl PolicyFile {
     }
 
     pub(crate) fn load(&self, folder: &Path) -> Result<OptionPolicy, FileError> {
+        self.load_with(folder, &mut Networks::default())
+    }
+
+    /// The same; networks that were read before are taken from `networks`.
+    fn load_with(&self, folder: &Path, networks: &mut Networks) -> Result<OptionPolicy, FileError> {
         Ok(match self {
             Self::Follower(follower) => OptionPolicy::Follower(*follower),
             Self::Profiled(follower) => OptionPolicy::Profiled(*follower),
             Self::Network { interface, weights } => {
+                if let Some(network) = networks.get(weights) {
+                    let fits = network.actor.spec().observation_len == interface.observation_len();
+                    if fits {
+                        return Ok(OptionPolicy::Network(network.with_interface(*interface)));
+                    }
+                }
                 let bytes = files::read_blob(folder, weights)?;
                 let path = folder.join(weights);
                 let (actor, _) =
@@ -76,11 +91,16 @@ impl PolicyFile {
                 {
                     return Err(FileError::content(&path, "the network does not fit the policy's interface"));
                 }
-                OptionPolicy::Network(NetworkPolicy::new(*interface, Arc::new(actor)))
+                let network = NetworkPolicy::new(*interface, Arc::new(actor));
+                networks.insert(weights.clone(), network.clone());
+                OptionPolicy::Network(network)
             }
         })
     }
 }
+
+/// Networks by the names of their weights: the options of a building share few.
+type Networks = BTreeMap<String, NetworkPolicy>;
 
 /// An option with its policy and all that was measured of it.
 #[derive(Clone, Debug)]
@@ -112,8 +132,14 @@ struct OptionFile {
 pub struct OptionLibrary {
     folder: Option<PathBuf>,
     options: BTreeMap<OptionId, StoredOption>,
-    /// Files of the same world with other maps, by corridor.
-    elsewhere: BTreeMap<String, PathBuf>,
+    /// What is known of whole buildings, by fingerprint.
+    buildings: BTreeMap<String, Building>,
+    /// Folders of the same world with other maps.
+    other_maps: Vec<PathBuf>,
+    /// Option files in them by corridor, read when the first option is looked for.
+    elsewhere: OnceLock<BTreeMap<String, PathBuf>>,
+    /// Changes whenever an option or a building does.
+    version: u64,
     /// Options that are to be written by [`OptionLibrary::save`]; `None` where they are written at once.
     unsaved: Option<BTreeSet<OptionId>>,
 }
@@ -132,7 +158,7 @@ impl OptionLibrary {
     /// Returns an error that names the file that is damaged or of another format.
     pub fn open(root: &Path, key: &str) -> Result<Self, FileError> {
         let folder = root.join(key);
-        let mut options = BTreeMap::new();
+        let (mut options, mut networks) = (BTreeMap::new(), Networks::new());
         for path in option_files(&folder)? {
             let file: OptionFile = files::read_ron(&path)?;
             if file.format != FORMAT {
@@ -144,10 +170,11 @@ impl OptionLibrary {
             if path.file_name() != Some(file_name(file.id).as_ref()) {
                 return Err(FileError::content(&path, format!("holds the option {}", file.id)));
             }
-            options.insert(file.id, load_option(file, &folder)?);
+            options.insert(file.id, load_option(file, &folder, &mut networks)?);
         }
-        let elsewhere = files_elsewhere(root, key);
-        Ok(Self { folder: Some(folder), options, elsewhere, unsaved: None })
+        let buildings = read_buildings(&folder)?;
+        let other_maps = folders_elsewhere(root, key);
+        Ok(Self { folder: Some(folder), options, buildings, other_maps, ..Self::default() })
     }
 
     /// Opens the part of the library at `root` for what `method` learns in `world` under `noise` in the simulator
@@ -189,6 +216,16 @@ impl OptionLibrary {
         self.unsaved.get_or_insert_default();
     }
 
+    /// From now on what is inserted is written at once, and what was not written yet is written now.
+    ///
+    /// # Errors
+    /// Returns an error that names the file that could not be written.
+    pub fn save_at_once(&mut self) -> Result<(), FileError> {
+        self.save()?;
+        self.unsaved = None;
+        Ok(())
+    }
+
     /// Writes what was inserted and is not on disk yet.
     ///
     /// # Errors
@@ -205,8 +242,66 @@ impl OptionLibrary {
     /// cell by cell. Damaged files of other maps are passed over.
     #[must_use]
     pub fn adopt(&self, corridor: &str) -> Option<StoredOption> {
-        let path = self.elsewhere.get(corridor)?;
-        load_option(files::read_ron(path).ok()?, path.parent()?).ok()
+        let path = self.elsewhere.get_or_init(|| files_in(&self.other_maps)).get(corridor)?;
+        load_option(files::read_ron(path).ok()?, path.parent()?, &mut Networks::new()).ok()
+    }
+
+    /// What is known of the building whose options have this fingerprint.
+    #[must_use]
+    pub fn building(&self, fingerprint: &str) -> Option<&Building> {
+        self.buildings.get(fingerprint)
+    }
+
+    /// All hand-overs that were driven in this map.
+    pub fn hand_overs(&self) -> impl Iterator<Item = &HandOver> {
+        self.buildings.values().flat_map(|building| &building.hand_overs)
+    }
+
+    /// All hand-overs that were driven in this world, in this map or another, by key. Damaged files of other maps are
+    /// passed over.
+    pub(crate) fn hand_overs_by_key(&self) -> BTreeMap<String, HandOver> {
+        let elsewhere = self.other_maps.iter().filter_map(|folder| read_buildings(folder).ok());
+        let elsewhere = elsewhere.flat_map(BTreeMap::into_values).flat_map(|building| building.hand_overs);
+        elsewhere.chain(self.hand_overs().cloned()).map(|one| (one.key.clone(), one)).collect()
+    }
+
+    /// Keeps what is known of a building, on disk first, and clears its blocks away.
+    pub(crate) fn keep_building(&mut self, building: Building) -> Result<(), FileError> {
+        let fingerprint = building.fingerprint.clone();
+        if self.buildings.get(&fingerprint) != Some(&building) {
+            if let Some(folder) = &self.folder {
+                files::write_ron(&folder.join(building_file(&fingerprint)), &building)?;
+            }
+            self.buildings.insert(fingerprint.clone(), building);
+            self.version += 1;
+        }
+        if let Some(folder) = self.folder.as_ref().map(|folder| folder.join(blocks_folder(&fingerprint))) {
+            // Blocks that stay behind are read and found to be the same.
+            let _ = std::fs::remove_dir_all(folder);
+        }
+        Ok(())
+    }
+
+    /// The hand-overs of block number `unit`, none if nobody did it.
+    pub(crate) fn read_block(&self, fingerprint: &str, unit: usize) -> Result<Vec<HandOver>, FileError> {
+        let path = self.folder.as_ref().map(|folder| block_file(folder, fingerprint, unit));
+        path.filter(|path| path.exists()).map_or(Ok(vec![]), |path| files::read_ron(&path))
+    }
+
+    /// Keeps the hand-overs of block number `unit` until the building is whole.
+    pub(crate) fn write_block(
+        &self,
+        fingerprint: &str,
+        unit: usize,
+        block: &[HandOver],
+    ) -> Result<(), FileError> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        files::write_ron(&block_file(folder, fingerprint, unit), &block)
+    }
+
+    /// A number that changes whenever an option or a building does.
+    pub(crate) const fn version(&self) -> u64 {
+        self.version
     }
 
     /// The folder of its files, if it has one.
@@ -248,6 +343,7 @@ impl OptionLibrary {
             None => self.write(id, &option)?,
         }
         self.options.insert(id, option);
+        self.version += 1;
         Ok(())
     }
 
@@ -275,6 +371,11 @@ fn file_name(id: OptionId) -> String {
 }
 
 fn option_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    files_named(folder, |name| name.starts_with("c_") || name.starts_with("i_"))
+}
+
+/// The RON files in `folder` whose names `is_wanted`, sorted; none if there is no such folder.
+fn files_named(folder: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<PathBuf>, FileError> {
     if !folder.exists() {
         return Ok(vec![]);
     }
@@ -283,7 +384,7 @@ fn option_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     for entry in std::fs::read_dir(folder).map_err(error)? {
         let path = entry.map_err(error)?.path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or("");
-        if name.ends_with(".ron") && (name.starts_with("c_") || name.starts_with("i_")) {
+        if name.ends_with(".ron") && is_wanted(name) {
             paths.push(path);
         }
     }
@@ -291,9 +392,9 @@ fn option_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     Ok(paths)
 }
 
-fn load_option(file: OptionFile, folder: &Path) -> Result<StoredOption, FileError> {
+fn load_option(file: OptionFile, folder: &Path, networks: &mut Networks) -> Result<StoredOption, FileError> {
     let learnt = LearntPolicy {
-        policy: file.policy.load(folder)?,
+        policy: file.policy.load_with(folder, networks)?,
         estimate: SuccessEstimate { count: file.verified, mean_time_s: file.mean_time_s },
         env_steps: file.env_steps,
         gradient_steps: file.gradient_steps,
@@ -301,9 +402,35 @@ fn load_option(file: OptionFile, folder: &Path) -> Result<StoredOption, FileErro
     Ok(StoredOption { guide: file.guide, learnt, corridor: file.corridor })
 }
 
-/// The option files of the world of `key` with other maps, by corridor.
-fn files_elsewhere(root: &Path, key: &str) -> BTreeMap<String, PathBuf> {
-    let Some((world, _)) = key.rsplit_once('-') else { return BTreeMap::new() };
+fn building_file(fingerprint: &str) -> String {
+    format!("{BUILDING}{fingerprint}.ron")
+}
+
+fn blocks_folder(fingerprint: &str) -> String {
+    format!("hand-overs-{fingerprint}")
+}
+
+fn block_file(folder: &Path, fingerprint: &str, unit: usize) -> PathBuf {
+    folder.join(blocks_folder(fingerprint)).join(format!("{unit:05}.ron"))
+}
+
+/// What the files of whole buildings in `folder` say, by fingerprint.
+fn read_buildings(folder: &Path) -> Result<BTreeMap<String, Building>, FileError> {
+    let mut buildings = BTreeMap::new();
+    for path in files_named(folder, |name| name.starts_with(BUILDING))? {
+        let building: Building = files::read_ron(&path)?;
+        if building.format != BUILDING_FORMAT {
+            let problem = format!("format is {}, expected {BUILDING_FORMAT}", building.format);
+            return Err(FileError::content(&path, problem));
+        }
+        buildings.insert(building.fingerprint.clone(), building);
+    }
+    Ok(buildings)
+}
+
+/// The folders of the world of `key` with other maps.
+fn folders_elsewhere(root: &Path, key: &str) -> Vec<PathBuf> {
+    let Some((world, _)) = key.rsplit_once('-') else { return vec![] };
     let folders = std::fs::read_dir(root).into_iter().flatten().flatten();
     let mut folders: Vec<PathBuf> = folders
         .filter(|entry| {
@@ -314,6 +441,11 @@ fn files_elsewhere(root: &Path, key: &str) -> BTreeMap<String, PathBuf> {
         .map(|entry| entry.path())
         .collect();
     folders.sort();
+    folders
+}
+
+/// The option files in `folders`, by corridor.
+fn files_in(folders: &[PathBuf]) -> BTreeMap<String, PathBuf> {
     let files = folders.iter().filter_map(|folder| option_files(folder).ok()).flatten();
     files
         .filter_map(|path| {

@@ -15,6 +15,9 @@ use crate::learn::{OptionLearner, PaperProtocol, PriorOnly, Selection};
 /// Prices are not exact: a plan that seems cheaper by less than this factor is not worth trying.
 const RETRY_ABOVE: f64 = 1.1;
 
+/// How fast legs without a guide are thought to be driven where an answer is wanted at once, as a share of the top speed.
+const UNGUIDED_SPEED: f64 = 0.6;
+
 /// How a problem is solved.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -90,7 +93,7 @@ pub enum PriceRule {
 
 /// What the search may assume and must respect.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct SearchSettings {
     /// What an option is taken to cost before anything was measured.
@@ -112,6 +115,13 @@ pub struct SearchSettings {
     /// paper's.
     #[serde(default = "yes")]
     pub departures: bool,
+    /// Routes with different safety margins of which the cheapest is the direct way, at most; files do not keep it.
+    #[serde(skip)]
+    pub direct_routes: usize,
+    /// Legs without a guide are taken to be driven straight at this share of the top speed. 1 never overestimates, so that no
+    /// better plan is missed; less guides fewer legs. Files do not keep it.
+    #[serde(skip)]
+    pub unguided_speed: f64,
     /// Learnt options cost what was measured of them (line 17 of Algorithm 1); false keeps the first costs.
     pub cost_update: bool,
     /// Largest turn between two guides that a robot which turns in place makes without stopping, radians.
@@ -138,6 +148,8 @@ impl Default for SearchSettings {
             bypasses: true,
             direct: true,
             departures: true,
+            direct_routes: 7,
+            unguided_speed: 1.0,
             cost_update: true,
             // The footprint swings out in a turn: beyond 75 degrees it needs clearance or a smaller circle.
             smooth_turn_rad: 75.0_f64.to_radians(),
@@ -239,6 +251,22 @@ impl Method {
     #[must_use]
     pub fn with_guides(self, guide: GuideSettings) -> Self {
         Self { guides: guide.to_planner(), search: SearchSettings { guide, ..self.search }, ..self }
+    }
+
+    /// The same for questions to a building that was learnt: odds are composed of what the library knows, nothing is run
+    /// from end to end or repaired, and few guides are planned.
+    #[must_use]
+    pub fn composed(self) -> Self {
+        let guide = self.search.guide.unsampled();
+        let search = SearchSettings { direct_routes: 1, unguided_speed: UNGUIDED_SPEED, ..self.search };
+        Self { verify_episodes: 0, search, ..self }.with_guides(guide)
+    }
+
+    /// A composed method with all the patience of the usual one for guides; `None` for one that has it.
+    pub(crate) fn patient(&self) -> Option<Self> {
+        let usual = SearchSettings { guide: GuideSettings::default(), ..self.search };
+        let is_hurried = self.verify_episodes == 0 && self.search.guide.sampling != usual.guide.sampling;
+        is_hurried.then(|| self.clone().with_guides(usual.guide))
     }
 
     /// The same with guides by Learn and Link, as in the paper.

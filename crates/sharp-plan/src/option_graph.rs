@@ -104,6 +104,18 @@ impl OptionGraph {
         self.nodes.get(&id).and_then(|&node| self.graph[node].as_ref())
     }
 
+    /// The pairs of options of which the second may follow the first, in a defined order.
+    pub fn option_pairs(&self) -> impl Iterator<Item = (OptionId, OptionId)> + use<'_> {
+        let id = |node: NodeIndex| match self.graph[node].as_ref().map(Candidate::id) {
+            Some(LegId::Option(id)) => Some(id),
+            _ => None,
+        };
+        self.graph.edge_indices().filter_map(move |edge| {
+            let (before, after) = self.graph.edge_endpoints(edge)?;
+            Some((id(before)?, id(after)?))
+        })
+    }
+
     /// The cheapest sequence of options from start to goal, or `None` if every one has an infinite cost.
     ///
     /// `cost(leg)` and `join(before, after)` are seconds, not negative, infinite where impossible;

@@ -16,6 +16,7 @@ use crate::files::{self, FileError};
 use crate::learn::LearntPolicy;
 use crate::library::{FORMAT, PolicyFile};
 use crate::method::{Method, SearchSettings};
+use crate::odds::ComposedOdds;
 use crate::price::Pricer;
 use crate::query::Query;
 use crate::verify::{PlannedOption, Solution};
@@ -136,6 +137,8 @@ struct PlanFile {
     goal: Pose,
     predicted: SuccessCount,
     predicted_time_s: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    composed: Option<ComposedOdds>,
     steps: Vec<StepFile>,
 }
 
@@ -192,6 +195,7 @@ impl Plan {
             goal: self.solution.query.goal,
             predicted: self.solution.predicted,
             predicted_time_s: self.solution.predicted_time_s,
+            composed: self.solution.composed.clone(),
             steps: steps.collect::<Result<_, _>>()?,
         };
         files::write_ron(&folder.join(PLAN_FILE), &file)
@@ -222,14 +226,14 @@ impl Plan {
             return Err(FileError::content(&path, "steps is empty, expected at least one"));
         }
         let query = Query { start: file.start, goal: file.goal };
-        let (predicted, predicted_time_s) = (file.predicted, file.predicted_time_s);
+        let (predicted, predicted_time_s, composed) = (file.predicted, file.predicted_time_s, file.composed);
         Ok(Self {
             world,
             abstraction,
             noise: file.noise,
             method,
             seed: file.seed,
-            solution: Solution { query, steps, predicted, predicted_time_s },
+            solution: Solution { query, steps, predicted, predicted_time_s, composed },
         })
     }
 }

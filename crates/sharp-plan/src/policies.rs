@@ -1,6 +1,7 @@
 //! The policies at hand while a problem is solved: from the library, or learnt now.
 
-use sharp_guide::{GuidePath, GuidedOption, LegId, Role};
+use sharp_drive::SuccessEstimate;
+use sharp_guide::{GuidedOption, LegId, Role};
 use sharp_space::OccupancyGrid;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,47 +13,51 @@ use crate::library::{OptionLibrary, StoredOption};
 #[derive(Debug)]
 pub(crate) struct Policies<'a> {
     library: &'a mut OptionLibrary,
+    /// Legs that only this problem has, and options that changed in it.
     learnt: BTreeMap<LegId, LearntPolicy>,
-    /// Options whose policy existed before this problem.
-    before: BTreeSet<LegId>,
+    /// Options that had no policy before this problem.
+    fresh: BTreeSet<LegId>,
 }
 
 impl<'a> Policies<'a> {
     /// The policies of `library`.
-    pub(crate) fn new(library: &'a mut OptionLibrary) -> Self {
-        let learnt: BTreeMap<LegId, LearntPolicy> =
-            library.iter().map(|(id, stored)| (LegId::Option(id), stored.learnt.clone())).collect();
-        let before = learnt.keys().copied().collect();
-        Self { library, learnt, before }
-    }
-
-    /// The guides of `library`.
-    pub(crate) fn guides(library: &OptionLibrary) -> Vec<(LegId, GuidePath)> {
-        library.iter().map(|(id, stored)| (LegId::Option(id), stored.guide.clone())).collect()
+    pub(crate) const fn new(library: &'a mut OptionLibrary) -> Self {
+        Self { library, learnt: BTreeMap::new(), fresh: BTreeSet::new() }
     }
 
     pub(crate) fn get(&self, id: LegId) -> Option<&LearntPolicy> {
-        self.learnt.get(&id)
+        let stored = || match id {
+            LegId::Option(id) => self.library.get(id).map(|stored| &stored.learnt),
+            _ => None,
+        };
+        self.learnt.get(&id).or_else(stored)
     }
 
     /// The policy of an option that has one.
     pub(crate) fn learnt(&self, id: LegId) -> &LearntPolicy {
-        &self.learnt[&id]
+        self.get(id).expect("an option of a plan has a policy")
     }
 
     /// Whether the policy of the option existed before this problem.
     pub(crate) fn is_reused(&self, id: LegId) -> bool {
-        self.before.contains(&id)
+        id.role() == Role::Option && !self.fresh.contains(&id)
+    }
+
+    /// Notes what was seen of the leg called `id` in this problem.
+    pub(crate) fn note(&mut self, id: LegId, estimate: SuccessEstimate) {
+        if let Some(learnt) = self.learnt.get_mut(&id) {
+            learnt.estimate = estimate;
+        }
     }
 
     /// Takes the policy of `option` from another map of the library where its corridor is the same.
     pub(crate) fn adopt(&mut self, option: &GuidedOption, grid: &OccupancyGrid) -> Result<(), FileError> {
-        if self.learnt.contains_key(&option.id) || option.id.role() != Role::Option {
+        if self.get(option.id).is_some() || option.id.role() != Role::Option {
             return Ok(());
         }
         if let Some(stored) = self.library.adopt(&corridor(option, grid)) {
-            self.before.insert(option.id);
             self.keep(option, stored.learnt, grid)?;
+            self.fresh.remove(&option.id);
         }
         Ok(())
     }
@@ -64,6 +69,9 @@ impl<'a> Policies<'a> {
         learnt: LearntPolicy,
         grid: &OccupancyGrid,
     ) -> Result<(), FileError> {
+        if self.get(option.id).is_none() {
+            self.fresh.insert(option.id);
+        }
         if let (LegId::Option(id), true) = (option.id, learnt.estimate.count.successes > 0) {
             let corridor = corridor(option, grid);
             let stored = StoredOption { guide: option.guide.clone(), learnt: learnt.clone(), corridor };

@@ -39,9 +39,9 @@ pub(crate) struct Price {
 }
 
 impl Price {
-    /// The chance to succeed.
-    pub(crate) const fn success(&self) -> f64 {
-        self.success
+    /// Mean time of a success, seconds, and the chance of it.
+    pub(crate) const fn parts(&self) -> (f64, f64) {
+        (self.time_s, self.success)
     }
 }
 

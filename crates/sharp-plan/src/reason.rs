@@ -109,7 +109,7 @@ fn narrowest_place(world: &World, query: &Query) -> Option<Point> {
 }
 
 /// The free length of the shortest straight line through `place`, metres.
-fn width_at(world: &World, place: Point) -> f64 {
+pub(crate) fn width_at(world: &World, place: Point) -> f64 {
     let frame = world.grid.frame();
     let step_m = 0.05 * frame.resolution_m;
     let is_free =

@@ -81,6 +81,25 @@ enum Pending {
     BackOff { from: Pose, distance_m: f64, actions: u32 },
 }
 
+impl Reading {
+    /// The robot's state, if it was in the state `before` one action ago: motion that was not told is taken from there.
+    #[must_use]
+    pub fn state(&self, before: Option<&RobotState>) -> RobotState {
+        let mut state = RobotState::at_rest(self.pose);
+        let action_s = ActionSettings::default().action_s;
+        if let Some(before) = before {
+            state.velocity = before.pose.to_local(self.pose.position) / action_s;
+            state.yaw_rate_radps = before.pose.heading.turn_to(self.pose.heading) / action_s;
+            state.steer_rad = before.steer_rad;
+        }
+        if let Some(speed_mps) = self.speed_mps {
+            state.velocity = Vector::new(speed_mps, 0.0);
+        }
+        state.yaw_rate_radps = self.yaw_rate_radps.unwrap_or(state.yaw_rate_radps);
+        state
+    }
+}
+
 impl RemoteDriver {
     /// Drives through `plans`, one after the other, from where the robot is now.
     ///
@@ -88,13 +107,31 @@ impl RemoteDriver {
     /// If there is no plan.
     #[must_use]
     pub fn new(plans: Vec<Arc<Plan>>, first: &Reading, recovery: bool) -> Self {
-        let state = state(first, None);
+        Self::from_state(plans, first.state(None), recovery)
+    }
+
+    /// The same for a robot that is now in `state`.
+    ///
+    /// # Panics
+    /// If there is no plan.
+    #[must_use]
+    pub fn from_state(plans: Vec<Arc<Plan>>, state: RobotState, recovery: bool) -> Self {
         Self { policy: TourPolicy::new(plans, state, recovery), state, pending: Pending::Nothing }
+    }
+
+    /// How far the plan that runs has come: the number of its leg, from 0, and the share of its guide that is driven.
+    #[must_use]
+    pub fn progress(&self) -> (usize, f64) {
+        self.policy.progress()
     }
 
     /// What the robot has to do next; it was told to come back after one action.
     pub fn answer(&mut self, reading: &Reading) -> Instruction {
-        let state = state(reading, Some(&self.state));
+        self.answer_in(reading.state(Some(&self.state)))
+    }
+
+    /// The same for a robot that is now in `state`.
+    pub fn answer_in(&mut self, state: RobotState) -> Instruction {
         self.state = state;
         match self.pending {
             Pending::Nothing => {}
@@ -146,23 +183,6 @@ impl RemoteDriver {
     fn instruction(&self, waypoint: Option<Pose>, speed_mps: f64, status: RemoteStatus) -> Instruction {
         Instruction { waypoint, speed_mps, option: self.policy.option().id, status }
     }
-}
-
-/// The robot's state; motion that was not told is taken from the last two poses, one action apart.
-fn state(reading: &Reading, before: Option<&RobotState>) -> RobotState {
-    let pose = reading.pose;
-    let mut state = RobotState::at_rest(pose);
-    let action_s = ActionSettings::default().action_s;
-    if let Some(before) = before {
-        state.velocity = before.pose.to_local(pose.position) / action_s;
-        state.yaw_rate_radps = before.pose.heading.turn_to(pose.heading) / action_s;
-        state.steer_rad = before.steer_rad;
-    }
-    if let Some(speed_mps) = reading.speed_mps {
-        state.velocity = Vector::new(speed_mps, 0.0);
-    }
-    state.yaw_rate_radps = reading.yaw_rate_radps.unwrap_or(state.yaw_rate_radps);
-    state
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ use sharp_space::{Cell, Point, Pose, Seed, trig};
 
 use crate::abstraction::Abstraction;
 use crate::conditions::Conditions;
+use crate::known::KnownOptions;
 use crate::method::{Method, PriceRule, SearchSettings};
 use crate::option_graph::{Candidate, OptionGraph};
 use crate::price::{Price, Pricer};
@@ -63,6 +64,8 @@ pub struct Search<'a> {
     trials: Option<&'a Conditions>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
+    /// Options that are at hand from the beginning, the same for every search of a building.
+    known: Option<Arc<KnownOptions>>,
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
     charges: BTreeMap<(LegId, LegId), f64>,
     seed: Seed,
@@ -116,6 +119,7 @@ impl<'a> Search<'a> {
             departures: OnceLock::new(),
             trials: None,
             offers_direct: false,
+            known: None,
             charges: BTreeMap::new(),
             seed,
         };
@@ -126,6 +130,12 @@ impl<'a> Search<'a> {
             }
         }
         Ok(this)
+    }
+
+    /// The same with the guides, prices and hand-overs of `known`, which were made for this method.
+    #[must_use]
+    pub(crate) fn with_known(self, known: Arc<KnownOptions>) -> Self {
+        Self { known: Some(known), ..self }
     }
 
     /// From now on a plan may go from start to goal without any option, through all states, if the method allows it:
@@ -150,16 +160,31 @@ impl<'a> Search<'a> {
         loop {
             monitor.phase(Phase::Search);
             let (cost_s, ids) = self.cheapest(measured)?;
-            let missing: Vec<LegId> =
-                ids.iter().copied().filter(|id| !self.guided.contains_key(id)).collect();
+            let missing: Vec<LegId> = ids.iter().copied().filter(|&id| self.found(id).is_none()).collect();
             if missing.is_empty() {
-                let options: Option<_> = ids.iter().map(|id| self.guided[id].clone().ok()).collect();
+                let options: Option<_> = ids.iter().map(|&id| self.found(id)?.ok().cloned()).collect();
                 return options.map(|options| (cost_s, options));
             }
             monitor.phase(Phase::Guide);
-            let guided: Vec<_> = missing.par_iter().map(|&id| (id, self.guide(id))).collect();
-            guided.into_iter().for_each(|(id, option)| self.keep(id, option));
+            self.guide_all(&missing);
         }
+    }
+
+    /// Plans the guides of all of `ids`.
+    pub(crate) fn guide_all(&mut self, ids: &[LegId]) {
+        let guided: Vec<_> = ids.par_iter().map(|&id| (id, self.guide(id))).collect();
+        guided.into_iter().for_each(|(id, option)| self.keep(id, option));
+    }
+
+    /// What became of guiding the option called `id`; `None` if nobody tried.
+    pub(crate) fn found(&self, id: LegId) -> Option<Result<&Arc<GuidedOption>, &NoGuide>> {
+        let known = || self.known.as_ref()?.found(id);
+        self.guided.get(&id).map(Result::as_ref).or_else(known)
+    }
+
+    /// The price of a guided option.
+    fn price(&self, id: LegId) -> Option<&Price> {
+        self.prices.get(&id).or_else(|| self.known.as_ref()?.price(id))
     }
 
     /// Notes the guide of the option called `id`, or that it has none.
@@ -176,7 +201,9 @@ impl<'a> Search<'a> {
         let top_speed = self.world.robot.max_speed_mps;
         let cost = |option: &Candidate| self.cost_s(option, measured(option.id()));
         let charge = |before: &Candidate, after: &Candidate| {
-            self.charges.get(&(before.id(), after.id())).copied().unwrap_or(0.0)
+            let pair = (before.id(), after.id());
+            let known = || self.known.as_ref()?.charge(pair);
+            self.charges.get(&pair).copied().or_else(known).unwrap_or(0.0)
         };
         let strict =
             |before: &Candidate, after: &Candidate| self.hand_over_s(before, after) + charge(before, after);
@@ -190,7 +217,24 @@ impl<'a> Search<'a> {
 
     /// The option called `id` with a guide of its own, if it was guided.
     pub(crate) fn option(&self, id: LegId) -> Option<&GuidedOption> {
-        self.guided.get(&id).and_then(|option| option.as_deref().ok())
+        self.found(id).and_then(Result::ok).map(|option| &**option)
+    }
+
+    /// The options of the problem, and which may follow which.
+    pub(crate) const fn graph(&self) -> &OptionGraph {
+        &self.graph
+    }
+
+    /// Whether the robot can go on from the option called `before` to the one called `after` without a turn that it should
+    /// not make; true where one of them has no guide.
+    pub(crate) fn can_follow(&self, before: LegId, after: LegId) -> bool {
+        let candidates = (self.graph.candidate(before), self.graph.candidate(after));
+        matches!(candidates, (Some(before), Some(after)) if self.hand_over_s(before, after).is_finite())
+    }
+
+    /// What the guided option called `id` costs before it is measured, seconds without surcharges.
+    pub(crate) fn priced_s(&self, id: LegId) -> Option<f64> {
+        self.price(id).map(|price| self.pricer.cost_s(price, None))
     }
 
     /// The options that could not be guided, with the reason.
@@ -213,16 +257,17 @@ impl<'a> Search<'a> {
         let least_s = option.straight_m() / top_mps;
         let unguided_s = match settings.price {
             PriceRule::Length => least_s / settings.nominal_speed,
-            PriceRule::Profile | PriceRule::Model => least_s,
+            PriceRule::Profile | PriceRule::Model => least_s / settings.unguided_speed,
         };
         let bypass_s = if option.is_bypass { settings.bypass_surcharge_s } else { 0.0 };
         let measured = measured.filter(|_| settings.cost_update);
         // The direct way serves no later problem; it is there to be compared with as it is.
         let is_bare = measured.is_some() || id == LegId::Direct;
         let surcharge_s = if is_bare { 0.0 } else { settings.untrained_surcharge_s };
-        let cost_s = match self.guided.get(&option.id()) {
+        let cost_s = match self.found(option.id()) {
             Some(Ok(_)) => {
-                let cost_s = self.pricer.cost_s(&self.prices[&option.id()], measured.as_ref());
+                let price = self.price(option.id()).expect("a guided option is priced");
+                let cost_s = self.pricer.cost_s(price, measured.as_ref());
                 cost_s.max(if measured.is_some() { least_s } else { unguided_s })
             }
             Some(Err(_)) => return f64::INFINITY,
@@ -275,7 +320,7 @@ impl<'a> Search<'a> {
         }
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
         let is_tight = is_tight(&self.world.guide_robot(), self.query.start);
-        let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).success() >= LEAVES_WELL;
+        let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
         if !self.settings.departures || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
         }
@@ -354,8 +399,11 @@ impl<'a> Search<'a> {
         let robot = self.world.guide_robot();
         let price_s =
             |guide: &GuidePath| self.pricer.cost_s(&self.pricer.of_guide(LegId::Direct, guide, None), None);
-        let cheapest = ridge_routes(&robot, start, end).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
-        cheapest.or_else(|| routes(&robot, start, (end, 0.5 * self.goal.radius_m), expansions).next())
+        let routes_in = ridge_routes(&robot, start, end).take(self.settings.direct_routes);
+        let cheapest = routes_in.min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
+        let is_patient = self.settings.direct_routes > 1;
+        let goal = (end, 0.5 * self.goal.radius_m);
+        cheapest.or_else(|| if is_patient { routes(&robot, start, goal, expansions).next() } else { None })
     }
 
     fn guided(&self, candidate: &Candidate, guide: GuidePath) -> GuidedOption {

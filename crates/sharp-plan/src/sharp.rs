@@ -11,14 +11,17 @@ use sharp_space::{Detection, RegionDetector, Seed};
 use thiserror::Error;
 
 use crate::abstraction::{Abstraction, AbstractionSettings, construct};
-use crate::algorithm::{Outcome, solve};
+use crate::algorithm::{Outcome, solve_with};
+use crate::building::{BuildingMonitor, BuildingWork, LearningSite, Part, learn_hand_overs, learn_options};
 use crate::conditions::Conditions;
 use crate::files::FileError;
+use crate::known::KnownOptions;
 use crate::library::OptionLibrary;
 use crate::method::Method;
 use crate::plan_file::{AbstractionFile, Plan, map_hash};
 use crate::problem::PlanningProblem;
 use crate::query::{Monitor, Query};
+use crate::roster::{Area, Roster};
 
 /// A robot in a building that solves problem after problem and keeps what it learns.
 pub struct Sharp {
@@ -31,6 +34,8 @@ pub struct Sharp {
     conditions: Conditions,
     library: OptionLibrary,
     built: Option<Built>,
+    /// What the library knows here, and which version of it.
+    known: Option<(u64, Arc<KnownOptions>)>,
     seed: Seed,
 }
 
@@ -93,6 +98,7 @@ impl Sharp {
             conditions,
             library: OptionLibrary::in_memory(),
             built: None,
+            known: None,
             seed: Seed(1),
         }
     }
@@ -100,14 +106,14 @@ impl Sharp {
     /// The same with another method.
     #[must_use]
     pub fn with_method(self, method: Method) -> Self {
-        Self { method, ..self }
+        Self { method, known: None, ..self }
     }
 
     /// The same with options of `kind`, one of ours.
     #[must_use]
     pub fn with_options(self, kind: OptionKind) -> Self {
         match kind.family() {
-            Some(family) => Self { family: Arc::new(family), kind, built: None, ..self },
+            Some(family) => Self { family: Arc::new(family), kind, built: None, known: None, ..self },
             None => self,
         }
     }
@@ -115,26 +121,26 @@ impl Sharp {
     /// The same with options of a family from outside.
     #[must_use]
     pub fn with_family(self, family: Arc<dyn OptionFamily>) -> Self {
-        Self { family, kind: OptionKind::Custom, built: None, ..self }
+        Self { family, kind: OptionKind::Custom, built: None, known: None, ..self }
     }
 
     /// The same with states and options that are known already, which came from `source`.
     #[must_use]
     pub fn with_abstraction(self, abstraction: Abstraction, source: &str) -> Self {
         let built = Some(Built { abstraction, source: source.to_owned(), detection: None });
-        Self { built, ..self }
+        Self { built, known: None, ..self }
     }
 
     /// The same with other settings for building the abstraction.
     #[must_use]
     pub fn with_abstraction_settings(self, settings: AbstractionSettings) -> Self {
-        Self { settings, built: None, ..self }
+        Self { settings, built: None, known: None, ..self }
     }
 
     /// The same under another noise.
     #[must_use]
     pub fn with_noise(self, noise: NoiseModel) -> Self {
-        Self { conditions: Conditions { noise, ..self.conditions }, ..self }
+        Self { conditions: Conditions { noise, ..self.conditions }, known: None, ..self }
     }
 
     /// The same with policies learnt and verified in forks of `simulator`, which may be anybody's.
@@ -146,7 +152,7 @@ impl Sharp {
     /// The same with the options of `library`, which also keeps what is learnt.
     #[must_use]
     pub fn with_library(self, library: OptionLibrary) -> Self {
-        Self { library, ..self }
+        Self { library, known: None, ..self }
     }
 
     /// The same with another root of all randomness.
@@ -205,15 +211,52 @@ impl Sharp {
         Ok(AbstractionFile::new(map, source, self.kind, options, &*states))
     }
 
+    /// What the library knows of `abstraction`, made ready for searches; made again when the library has changed.
+    fn known(&mut self, abstraction: &Abstraction) -> Arc<KnownOptions> {
+        let Self { world, method, conditions, library, .. } = self;
+        let version = library.version();
+        let is_current = self.known.as_ref().is_some_and(|(made_of, _)| *made_of == version);
+        if !is_current {
+            let known = KnownOptions::new(world, abstraction, method, &conditions.noise, library);
+            self.known = Some((version, Arc::new(known)));
+        }
+        self.known.as_ref().map(|(_, known)| Arc::clone(known)).expect("just made")
+    }
+
+    /// Learns the part `part` of all options and hand-overs of the building, or of those `within` an area, that the library
+    /// lacks: first the options, and once all of them are there the hand-overs.
+    ///
+    /// # Errors
+    /// If the map has no room for the robot, or the library cannot be written.
+    pub fn learn_building(
+        &mut self,
+        (within, part): (Option<Area>, Part),
+        monitor: &dyn BuildingMonitor,
+    ) -> Result<(Roster, BuildingWork), SolveError> {
+        let abstraction = self.abstraction(&())?.clone();
+        let Self { world, method, conditions, library, seed, .. } = self;
+        let site = LearningSite { world, abstraction: &abstraction, method, conditions, seed: *seed };
+        let roster = Roster::new(&site, within);
+        monitor.planned(roster.options.len(), roster.hand_overs.len());
+        let mut work = BuildingWork::default();
+        library.save_at_once()?;
+        learn_options((&site, &roster), library, part, monitor, &mut work)?;
+        if !monitor.should_stop() {
+            learn_hand_overs((&site, &roster), library, part, monitor, &mut work)?;
+        }
+        Ok((roster, work))
+    }
+
     /// Algorithm 1: a plan for `query`. What is learnt stays in the library.
     ///
     /// # Errors
     /// If the map has no room for the robot, or the library cannot be written.
     pub fn solve(&mut self, query: Query, monitor: &dyn Monitor) -> Result<Answer, SolveError> {
         let abstraction = self.abstraction(monitor)?.clone();
+        let known = self.known(&abstraction);
         let Self { world, method, conditions, library, seed, .. } = self;
         let problem = PlanningProblem { world, method, conditions, query, seed: *seed, monitor };
-        Ok(match solve(&problem, &abstraction, library)? {
+        Ok(match solve_with(&problem, &abstraction, library, &known)? {
             Outcome::Solved(solution) => Answer::Solved(Box::new(Plan {
                 world: world.clone(),
                 abstraction,
@@ -225,5 +268,44 @@ impl Sharp {
             Outcome::NoPlan(reason) => Answer::NoPlan(reason),
             Outcome::Stopped => Answer::Stopped,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sharp_drive::SuccessCount;
+    use sharp_options::OptionKind;
+    use sharp_sim::SimulatorKind;
+    use sharp_space::Pose;
+
+    use super::*;
+    use crate::execute::{RunSettings, run, success};
+    use crate::test_worlds::{RING, world};
+
+    fn ring() -> Sharp {
+        let (world, abstraction) = world(RING, OptionKind::Interface);
+        Sharp::new(world, sharp_regions::GeometricDetector::default())
+            .with_abstraction(abstraction, "drawn")
+            .with_method(Method::fast().composed())
+    }
+
+    #[test]
+    fn odds_are_composed_of_what_was_learnt_and_hold() {
+        let mut sharp = ring();
+        let (roster, work) = sharp.learn_building((None, Part::ALL), &()).expect("in memory");
+        assert!(work.is_whole && !roster.options.is_empty(), "{work:?}");
+        let query = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+        let Answer::Solved(plan) = sharp.solve(query, &()).expect("in memory") else { panic!("a ring") };
+        let odds = plan.solution.composed.clone().expect("nothing was run");
+        assert_eq!(plan.solution.reuse().0, plan.solution.reuse().1, "every option was known");
+        let plan = Arc::new(*plan);
+        let mut settings = RunSettings::new(&plan, 400, Seed(9));
+        settings.simulator = plan.world.simulator(SimulatorKind::Kinematic);
+        let executions = run(&plan, &settings, &|| 0.0);
+        let SuccessCount { episodes, successes } = success(&executions);
+        let (rate, n) = (f64::from(successes) / f64::from(episodes), f64::from(episodes));
+        assert!((odds.success - rate).abs() < 0.03, "{} predicted, {rate} measured", odds.success);
+        let time_s = executions.iter().map(|one| one.record.time_s).sum::<f64>() / n;
+        assert!((odds.time_s / time_s - 1.0).abs() < 0.1, "{} s predicted, {time_s} s measured", odds.time_s);
     }
 }

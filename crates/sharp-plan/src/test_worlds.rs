@@ -117,7 +117,8 @@ pub(crate) fn plan(kind: OptionKind) -> Arc<Plan> {
         arrival_time_s: 5.0,
     };
     let steps = options(&world, &abstraction, along()).into_iter().map(planned).collect();
-    let solution = Solution { query: along(), steps, predicted: count, predicted_time_s: 20.0 };
+    let solution =
+        Solution { query: along(), steps, predicted: count, predicted_time_s: 20.0, composed: None };
     let (noise, method, seed) = (NoiseModel::none(), Method::fast(), Seed(1));
     Arc::new(Plan { world, abstraction, noise, method, seed, solution })
 }

@@ -226,6 +226,12 @@ impl TourPolicy {
         off_m > END_WITHIN_M && off_m < least_m && actions < ACTIONS_TO_END_MAX
     }
 
+    /// How far the present plan is: the number of its leg, from 0, and the share of its guide that is driven.
+    #[must_use]
+    pub fn progress(&self) -> (usize, f64) {
+        self.current.progress()
+    }
+
     /// Goals that come after the present one.
     #[must_use]
     pub const fn goals_to_come(&self) -> usize {

@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use sharp_drive::{ChainRun, Driver, EpisodeEnd, MonteCarlo, SuccessCount, SuccessEstimate};
+use sharp_drive::{ChainRun, Driver, EpisodeEnd, MonteCarlo, SuccessCount, SuccessEstimate, expected_cost_s};
 use sharp_guide::{GuidedOption, Role};
 use sharp_sim::RobotState;
 
+use crate::known::KnownOptions;
 use crate::learn::LearntPolicy;
 use crate::method::Method;
+use crate::odds::{ComposedOdds, PlanPiece, compose};
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Query;
@@ -38,6 +40,8 @@ pub struct Solution {
     pub predicted: SuccessCount,
     /// Mean simulated time of the successful ones, seconds; 0 without any.
     pub predicted_time_s: f64,
+    /// What the prediction was composed of, where no runs were made; then `predicted` are as many runs as it is worth.
+    pub composed: Option<ComposedOdds>,
 }
 
 impl Solution {
@@ -51,6 +55,14 @@ impl Solution {
     pub(crate) fn estimate(&self) -> SuccessEstimate {
         let mean_time_s = if self.predicted.successes == 0 { f64::INFINITY } else { self.predicted_time_s };
         SuccessEstimate { count: self.predicted, mean_time_s }
+    }
+
+    /// What a use of the plan is expected to cost, seconds.
+    pub(crate) fn cost_s(&self, failure_cost_s: f64) -> f64 {
+        match &self.composed {
+            Some(odds) => expected_cost_s(odds.time_s, odds.success, failure_cost_s),
+            None => self.estimate().cost_s(failure_cost_s),
+        }
     }
 }
 
@@ -105,6 +117,47 @@ pub(crate) fn verify(
         steps: plan.iter().enumerate().map(planned).collect(),
         predicted: count,
         predicted_time_s: if mean_time_s.is_finite() { mean_time_s } else { 0.0 },
+        composed: None,
+    }
+}
+
+/// Composes the odds of `plan` of what is `known`, without a run from end to end.
+pub(crate) fn predict(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &mut Policies<'_>,
+    known: &KnownOptions,
+) -> Solution {
+    let odds = compose(problem, plan, policies, known);
+    note_ends(plan, policies, &odds);
+    let planned = |(index, option): (usize, &Arc<GuidedOption>)| {
+        let learnt = policies.learnt(option.id).clone();
+        let is_in = |piece: &&PlanPiece| piece.until > index as f64;
+        let piece = odds.pieces.iter().find(is_in).expect("pieces reach the goal");
+        PlannedOption {
+            option: Arc::clone(option),
+            reused: policies.is_reused(option.id),
+            on_arrival: piece.count(),
+            arrival_time_s: learnt.estimate.mean_time_s,
+            learnt,
+        }
+    };
+    Solution {
+        query: problem.query,
+        steps: plan.iter().enumerate().map(planned).collect(),
+        predicted: odds.count(),
+        predicted_time_s: odds.time_s,
+        composed: Some(odds),
+    }
+}
+
+/// Notes how the first and the last leg did, so that the search takes other ones where they fail.
+fn note_ends(plan: &[Arc<GuidedOption>], policies: &mut Policies<'_>, odds: &ComposedOdds) {
+    let ends = [(plan.first(), odds.pieces.first()), (plan.last(), odds.pieces.last())];
+    for (leg, piece) in ends.into_iter().filter_map(|(leg, piece)| leg.zip(piece)) {
+        if leg.id.role() != Role::Option {
+            policies.note(leg.id, SuccessEstimate { count: piece.count(), mean_time_s: f64::INFINITY });
+        }
     }
 }
 
@@ -130,7 +183,7 @@ mod tests {
     fn options_are_counted_only_where_they_were_entered() {
         let arrival = RobotState::at_rest(Pose::new(0.0, 0.0, 0.0));
         let run = |count, end| {
-            let visits = vec![Visit { entry: arrival, time_s: 1.0 }; count];
+            let visits = vec![Visit { entry: arrival, time_s: 1.0, half_s: None }; count];
             ChainRun { visits, arrival, end }
         };
         let runs = [run(2, EpisodeEnd::Reached), run(2, EpisodeEnd::Collided), run(1, EpisodeEnd::Lost)];

@@ -1,6 +1,7 @@
 //! `sharp serve`: drives any robot or simulator from outside, one JSON line each way.
 
 use std::io::{BufRead, Write};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use sharp_plan::{Instruction, Plan, Reading, RemoteDriver};
@@ -30,7 +31,7 @@ struct Reply<'a> {
 }
 
 pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
-    let tour = load_tour(&args.plan_dir)?;
+    let tour = load_tour(Path::new(&args.place))?;
     let plan = &tour.plans[0];
     let mut driver: Option<RemoteDriver> = None;
     let mut out = std::io::stdout().lock();

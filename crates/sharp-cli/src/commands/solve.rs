@@ -122,15 +122,16 @@ fn method(args: &Solve) -> Result<Method, Failure> {
     method.search.cost_update = args.cost_update == Switch::On;
     method.failure_cost_s = args.failure_cost;
     if args.verify != "auto" {
-        let episodes = args.verify.parse().ok().filter(|episodes| (1..=EPISODES_MAX).contains(episodes));
+        let episodes = args.verify.parse().ok().filter(|episodes| (0..=EPISODES_MAX).contains(episodes));
         let usage = || {
             let message =
-                format!("--verify is {:?}, expected auto or a number from 1 to {EPISODES_MAX}", args.verify);
+                format!("--verify is {:?}, expected auto or a number from 0 to {EPISODES_MAX}", args.verify);
             Failure::new("USAGE", message)
         };
         (method.verify_episodes, method.verify_half_width) = (episodes.ok_or_else(usage)?, 0.0);
     }
-    Ok(if args.guide == Guide::Paper { method.with_learn_and_link() } else { method })
+    let method = if args.guide == Guide::Paper { method.with_learn_and_link() } else { method };
+    Ok(if method.verify_episodes == 0 { method.composed() } else { method })
 }
 
 /// Writes the page of the plan in `folder` where it is wanted, and says where it is.

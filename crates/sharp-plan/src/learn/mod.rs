@@ -56,6 +56,12 @@ pub trait OptionLearner: Debug + Send + Sync {
         Ok(None)
     }
 
+    /// A policy for the option of `task` that is at hand without an episode, where there is one: what drives the first and the
+    /// last leg of a plan whose options are known already.
+    fn at_hand(&self, _task: &LearningTask<'_>) -> Option<OptionPolicy> {
+        None
+    }
+
     /// Success below which [`improve`](Self::improve) wants to train, share of episodes.
     fn train_below(&self) -> f64 {
         0.0

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sharp_drive::{Driver, InitialStates};
-use sharp_guide::GuidedOption;
+use sharp_drive::{Driver, InitialStates, SuccessCount, SuccessEstimate};
+use sharp_guide::{GuidedOption, Role};
 use sharp_sim::RobotState;
 use sharp_space::Seed;
 
@@ -32,6 +32,10 @@ pub(crate) fn learn_missing(
     for option in plan {
         policies.adopt(search.option(option.id).unwrap_or(option), &problem.world.grid)?;
     }
+    let is_composed = problem.method.verify_episodes == 0;
+    if is_composed {
+        take_at_hand(problem, plan, search, policies)?;
+    }
     let missing: Vec<&Arc<GuidedOption>> =
         plan.iter().filter(|option| policies.get(option.id).is_none()).collect();
     problem.monitor.phase(Phase::Learn(missing.len()));
@@ -39,9 +43,33 @@ pub(crate) fn learn_missing(
         return Ok(true);
     }
     match problem.method.order {
+        // Without runs of the whole plan nobody learns from where it arrives.
+        LearningOrder::Chained if is_composed => learn_independent(problem, &missing, search, policies),
         LearningOrder::Chained => learn_chained(problem, plan, search, policies),
         LearningOrder::Independent => learn_independent(problem, &missing, search, policies),
     }
+}
+
+/// Gives the first and the last leg of `plan` what drives them without an episode, where the learner has it.
+fn take_at_hand(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    search: &Search<'_>,
+    policies: &mut Policies<'_>,
+) -> Result<(), FileError> {
+    for option in plan.iter().filter(|option| option.id.role() != Role::Option) {
+        if policies.get(option.id).is_some() {
+            continue;
+        }
+        let seed = option_seed(problem, option);
+        let states = InitialStates::exactly(RobotState::at_rest(option.guide.start()));
+        if let Some(policy) = problem.method.learner.at_hand(&task(problem, option, states, seed)) {
+            let estimate = SuccessEstimate { count: SuccessCount::default(), mean_time_s: f64::INFINITY };
+            let learnt = LearntPolicy::untrained(policy, estimate);
+            policies.keep(search.option(option.id).unwrap_or(option), learnt, &problem.world.grid)?;
+        }
+    }
+    Ok(())
 }
 
 /// One option after the other, each from where the one before it arrives and with the next in view.

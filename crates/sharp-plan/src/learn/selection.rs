@@ -106,6 +106,10 @@ impl OptionLearner for Selection {
         }))
     }
 
+    fn at_hand(&self, task: &LearningTask<'_>) -> Option<OptionPolicy> {
+        Some(prior(task))
+    }
+
     fn train_below(&self) -> f64 {
         self.train_below
     }

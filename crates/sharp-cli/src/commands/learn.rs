@@ -1,0 +1,119 @@
+//! `sharp learn`: a building ahead of time.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use indicatif::ProgressBar;
+use sharp_bench::{LearnReport, NamedWorld, SolveSettings, Stopwatch, learn};
+use sharp_plan::{BuildingMonitor, HandOver, LearntPolicy, Method, Part, RosterOption};
+
+use crate::args::Learn;
+use crate::input;
+use crate::outcome::{Exit, Failure, say, to_json};
+use crate::progress::{bar, is_interrupted};
+
+pub(crate) fn run(args: &Learn, seed: u64, json: bool) -> Result<Exit, Failure> {
+    let stopwatch = Stopwatch::start("learn");
+    let map = input::map(&args.map)?;
+    let place = NamedWorld::new(&map, &args.abstraction.robot, &args.noise)?;
+    let settings = SolveSettings {
+        abstraction: args.abstraction.request(),
+        method: Method::by_name(args.learning.name()).expect("every word names a method"),
+        simulator: input::simulator(&args.simulator)?,
+        seed,
+    };
+    args.out.as_deref().map_or(Ok(()), |folder| input::check_out("--out", folder))?;
+    let library = input::library(args.library.as_deref()).ok_or_else(|| {
+        Failure::new("USAGE", "--library is none, expected a folder: what is learnt must be kept somewhere")
+    })?;
+    let monitor = LearnBar::new();
+    let part = args.part.unwrap_or(Part::ALL);
+    let learnt = learn(&place, &settings, &library, (args.within, part), &monitor);
+    monitor.bar.finish_and_clear();
+    let mut learnt = learnt?;
+    if let Some(folder) = &args.out {
+        learnt.draw(folder)?;
+    }
+    learnt.report.time_s = stopwatch.total_s();
+    if json {
+        say!("{}", to_json(&learnt.report));
+    } else {
+        print_report(&learnt.report);
+    }
+    Ok(match learnt.report.status {
+        _ if is_interrupted() => Exit::Interrupted,
+        "whole" => Exit::Done,
+        _ => Exit::Partial,
+    })
+}
+
+/// Shows on a terminal how far the learning is, and stops it when the user does.
+struct LearnBar {
+    bar: ProgressBar,
+    episodes: AtomicU64,
+    successes: AtomicU64,
+}
+
+impl LearnBar {
+    fn new() -> Self {
+        Self { bar: bar(0, "options"), episodes: AtomicU64::new(0), successes: AtomicU64::new(0) }
+    }
+
+    /// One unit of `message` is done, which succeeded so often.
+    fn note(&self, message: &str, count: sharp_drive::SuccessCount) {
+        let add =
+            |sum: &AtomicU64, more: u32| sum.fetch_add(more.into(), Ordering::Relaxed) + u64::from(more);
+        let episodes = add(&self.episodes, count.episodes);
+        let successes = add(&self.successes, count.successes);
+        let share = 100.0 * successes as f64 / episodes.max(1) as f64;
+        self.bar.set_message(format!("{message}, {share:.1} % succeed"));
+        self.bar.inc(1);
+    }
+}
+
+impl BuildingMonitor for LearnBar {
+    fn planned(&self, options: usize, hand_overs: usize) {
+        self.bar.set_length((options + hand_overs) as u64);
+    }
+
+    fn option(&self, _: &RosterOption, learnt: &LearntPolicy) {
+        self.note("options", learnt.estimate.count);
+    }
+
+    fn hand_over(&self, hand_over: &HandOver) {
+        self.note("hand-overs", hand_over.count);
+    }
+
+    fn should_stop(&self) -> bool {
+        is_interrupted()
+    }
+}
+
+fn print_report(report: &LearnReport) {
+    let LearnReport { robot, noise, map, options, learnt, new, adopted, unguided, pairs, new_pairs, .. } =
+        report;
+    say!("{robot} on map {}, {noise} noise", map.name);
+    say!("{learnt} of {options} options learnt, {} of them now, {adopted} as in another map", new.len());
+    if *adopted > 0 && !new.is_empty() {
+        say!("learnt now: {}", new.join(" "));
+    }
+    if *unguided > 0 {
+        say!("{unguided} options lead nowhere for this robot");
+    }
+    say!("{pairs} hand-overs measured, {new_pairs} of them now");
+    if *pairs > 0 {
+        let success = &report.success;
+        say!("they succeed in {:.2} %, the worst in {:.1} %", 100.0 * success.mean, 100.0 * success.worst);
+    }
+    if !report.weakest.is_empty() {
+        say!("the weakest places:");
+    }
+    for weak in &report.weakest {
+        say!("  {:>5.1} %  {}", 100.0 * weak.success, weak.words);
+    }
+    say!("library: {}", report.library);
+    say!(
+        "took {:.1} s{}",
+        report.time_s,
+        if report.status == "whole" { "" } else { "; something is missing" }
+    );
+}

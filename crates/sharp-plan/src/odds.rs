@@ -1,0 +1,288 @@
+//! The odds of a plan without a run from end to end: composed of what its parts are known to hold.
+//!
+//! A plan is cut in the middle of each of its options. The pieces between two cuts were driven when the building was
+//! learnt ([`HandOver`](crate::HandOver)); the first and the last piece belong to this plan alone and are driven a few
+//! times, beside what the cost model says of them. The success of the plan is the product, its time the sum: each
+//! piece counts only robots that came to its first cut as plans make them come there.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use sharp_drive::{InitialStates, StateSpread, SuccessCount, SuccessEstimate, wilson95};
+use sharp_guide::{Departure, GuidePath, GuidedOption, LegId, Role};
+use sharp_sim::RobotState;
+
+use crate::hand_over::{RUN_UP_M, RunBudget, Stretch};
+use crate::known::KnownOptions;
+use crate::policies::Policies;
+use crate::price::Pricer;
+use crate::problem::PlanningProblem;
+
+/// Runs of a piece that no library has: first so many, and where one of them fails up to so many more.
+const EPISODES: (u32, u32) = (48, 192);
+/// Half the width of the 95 % interval at which these end.
+const HALF_WIDTH: f64 = 0.02;
+/// Runs that the cost model's word counts as beside runs none of which failed. Where some fail, runs alone count: the model
+/// knows little of places where a robot barely fits.
+const PRICE_EPISODES: f64 = 16.0;
+/// States in which the option before a last leg begins.
+const STATE_POOL: usize = 8;
+/// How they spread: as robots pass there.
+const PASSING: StateSpread = StateSpread { radius_m: 0.08, heading_sd_rad: 0.08, speed_max_mps: 1.0 };
+/// Successes that tell a mean time.
+const TIMED_MIN: u32 = 8;
+
+/// What a plan is known to hold, without a run from end to end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ComposedOdds {
+    /// The chance of success.
+    pub success: f64,
+    /// The lower end of its two-sided 95 % interval.
+    pub lower95: f64,
+    /// The upper end.
+    pub upper95: f64,
+    /// Mean time of a success, seconds.
+    pub time_s: f64,
+    /// Runs of the whole plan that would tell as much.
+    pub episodes: f64,
+    /// The parts, in order: from the start to the middle of the first option, from there to the middle of the next, …
+    pub pieces: Vec<PlanPiece>,
+}
+
+/// A piece of a plan between two cuts.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanPiece {
+    /// Where it ends, in legs from the start of the plan: 2.5 is the middle of the third leg.
+    pub until: f64,
+    /// The chance to come through.
+    pub success: f64,
+    /// Runs that it was counted on; the cost model's word counts as some.
+    pub episodes: f64,
+    /// Mean time, seconds.
+    pub time_s: f64,
+}
+
+impl ComposedOdds {
+    /// The odds of `pieces` that follow one another.
+    ///
+    /// The interval is Wilson's for as many runs as would leave the same uncertainty: to first order the variance of the logarithm of
+    /// a product is the sum of the factors' (1 - p) / (p n).
+    #[must_use]
+    pub fn of(pieces: Vec<PlanPiece>) -> Self {
+        let success: f64 = pieces.iter().map(|piece| piece.success).product();
+        let time_s = pieces.iter().map(|piece| piece.time_s).sum();
+        let variance: f64 = pieces
+            .iter()
+            .map(|piece| (1.0 - piece.success) / (piece.success.max(1e-9) * piece.episodes))
+            .sum();
+        let least = pieces.iter().map(|piece| piece.episodes).fold(f64::INFINITY, f64::min);
+        let most = pieces.iter().map(|piece| piece.episodes).fold(0.0, f64::max);
+        let told = (1.0 - success) / (success.max(1e-9) * variance);
+        let episodes = if told.is_finite() { told.clamp(0.0, most) } else { least };
+        let (lower95, upper95) = wilson95(success, episodes);
+        Self { success, lower95, upper95, time_s, episodes, pieces }
+    }
+
+    /// The nearest count of whole runs.
+    #[must_use]
+    pub fn count(&self) -> SuccessCount {
+        nearest_count(self.success, self.episodes)
+    }
+
+    /// The chance of success and the time, seconds, of what is left for a robot that has driven `share` of leg number `leg`.
+    #[must_use]
+    pub fn rest(&self, (leg, share): (usize, f64)) -> (f64, f64) {
+        let at = leg as f64 + share;
+        let mut begin = 0.0;
+        let mut rest = (1.0, 0.0);
+        for piece in &self.pieces {
+            let left = ((piece.until - at.max(begin)) / (piece.until - begin)).clamp(0.0, 1.0);
+            rest = (rest.0 * libm::pow(piece.success, left), rest.1 + left * piece.time_s);
+            begin = piece.until;
+        }
+        rest
+    }
+}
+
+impl PlanPiece {
+    /// The nearest count of whole runs.
+    pub(crate) fn count(&self) -> SuccessCount {
+        nearest_count(self.success, self.episodes)
+    }
+}
+
+fn nearest_count(success: f64, episodes: f64) -> SuccessCount {
+    let episodes = episodes.round().max(1.0) as u32;
+    SuccessCount { episodes, successes: (success * f64::from(episodes)).round() as u32 }
+}
+
+/// The odds of `plan`, whose guides are joined already, with `policies`.
+pub(crate) fn compose(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+    known: &KnownOptions,
+) -> ComposedOdds {
+    let whole = plan.len();
+    let options: Vec<usize> = (0..whole).filter(|&index| plan[index].id.role() == Role::Option).collect();
+    let (Some(first), Some(&last)) = (first_cut(plan, &options), options.last()) else {
+        return ComposedOdds::of(vec![end_piece(problem, plan, policies, (None, whole))]);
+    };
+    let mut pieces = vec![end_piece(problem, plan, policies, (None, first))];
+    for cut in first..last {
+        let known = match (plan[cut].id, plan[cut + 1].id) {
+            (LegId::Option(before), LegId::Option(after)) => known.hand_over(before, after),
+            _ => None,
+        };
+        pieces.push(match known {
+            Some(SuccessEstimate { count, mean_time_s }) if count.successes > 0 => PlanPiece {
+                until: cut as f64 + 1.5,
+                success: count.rate(),
+                episodes: f64::from(count.episodes),
+                time_s: *mean_time_s,
+            },
+            _ => end_piece(problem, plan, policies, (Some(cut), cut + 1)),
+        });
+    }
+    pieces.push(end_piece(problem, plan, policies, (Some(last), whole)));
+    ComposedOdds::of(pieces)
+}
+
+/// The option in whose middle a robot has left the first leg some metres behind, so that it does not matter any more.
+fn first_cut(plan: &[Arc<GuidedOption>], options: &[usize]) -> Option<usize> {
+    let mut way_m = 0.0;
+    for &index in options {
+        let length_m = plan[index].guide.length_m();
+        if way_m + 0.5 * length_m >= RUN_UP_M {
+            return Some(index);
+        }
+        way_m += length_m;
+    }
+    options.last().copied()
+}
+
+/// The piece of `plan` from the middle of leg `from`, or from the start, to the middle of leg `to`, or to the goal where there
+/// is no such leg: driven a few times, beside its price.
+fn end_piece(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+    (from, to): (Option<usize>, usize),
+) -> PlanPiece {
+    let SuccessEstimate { count, mean_time_s } = drive(problem, plan, policies, (from, to));
+    let (priced_s, success) = priced(problem, plan, (from, to));
+    let weight = if count.failures() == 0 { PRICE_EPISODES } else { 0.0 };
+    let episodes = weight + f64::from(count.episodes);
+    let success = (weight * success + f64::from(count.successes)) / episodes;
+    let time_s = if count.successes >= TIMED_MIN { mean_time_s } else { priced_s };
+    let until = if to < plan.len() { to as f64 + 0.5 } else { to as f64 };
+    PlanPiece { until, success, episodes, time_s }
+}
+
+/// Drives a piece of `plan`, with a run-up.
+fn drive(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+    (from, to): (Option<usize>, usize),
+) -> SuccessEstimate {
+    let PlanningProblem { world, conditions, query, .. } = *problem;
+    let begin = from.map_or(0, |cut| run_up(plan, cut));
+    let mut options = plan[begin..plan.len().min(to + 1)].to_vec();
+    let names: Vec<String> = options.iter().map(|leg| leg.id.to_string()).collect();
+    let seed = problem.seed.child(&format!("odds {}", names.join(" ")), 0);
+    let states = if begin == 0 {
+        InitialStates::exactly(RobotState::at_rest(query.start))
+    } else {
+        options[0] = from_run_up(&options[0], from.map_or(0.0, |cut| way_m(plan, begin, cut)));
+        InitialStates::spread(world, &options[0], &PASSING, STATE_POOL, seed)
+    };
+    let policies: Vec<_> = options.iter().map(|leg| &policies.learnt(leg.id).policy).collect();
+    let (from_middle_of, to_middle) = (from.map(|cut| cut - begin), to < plan.len());
+    let stretch = Stretch { options: &options, policies: &policies, from_middle_of, to_middle };
+    let some = RunBudget { episodes: (EPISODES.0, EPISODES.0), half_width: 0.0 };
+    let some = stretch.drive((world, conditions), &states, some, seed);
+    if some.count.failures() == 0 {
+        return some;
+    }
+    let more = RunBudget { episodes: (1, EPISODES.1), half_width: HALF_WIDTH };
+    stretch.drive((world, conditions), &states, more, seed.child("more", 0)).and(&some)
+}
+
+/// The way from the beginning of leg `begin` to the middle of leg `cut`, metres.
+fn way_m(plan: &[Arc<GuidedOption>], begin: usize, cut: usize) -> f64 {
+    let length_m = |leg: &Arc<GuidedOption>| leg.guide.length_m();
+    plan[begin..cut].iter().map(length_m).sum::<f64>() + 0.5 * length_m(&plan[cut])
+}
+
+/// The last leg from which robots have enough way to the middle of leg `cut`.
+fn run_up(plan: &[Arc<GuidedOption>], cut: usize) -> usize {
+    (0..=cut).rev().find(|&begin| way_m(plan, begin, cut) >= RUN_UP_M).unwrap_or(0)
+}
+
+/// `option` without the part of its guide by which `way_m` is longer than a run-up.
+fn from_run_up(option: &Arc<GuidedOption>, way_m: f64) -> Arc<GuidedOption> {
+    let guide = &option.guide;
+    let skipped_m = (way_m - RUN_UP_M).max(0.0);
+    let kept = (0..guide.poses().len()).filter(|&index| guide.arc_m(index) >= skipped_m);
+    match GuidePath::new(kept.map(|index| guide.poses()[index]).collect(), guide.spacing_m()) {
+        // The middle of a guide is no place to leave.
+        Ok(guide) if skipped_m > 0.0 => {
+            Arc::new(GuidedOption { guide, departure: Departure::default(), ..GuidedOption::clone(option) })
+        }
+        // Nothing is cut, or less than two poses are left: it is driven whole.
+        _ => Arc::clone(option),
+    }
+}
+
+/// Time, seconds, and success of a piece by its price; of a leg that is cut the half.
+fn priced(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    (from, to): (Option<usize>, usize),
+) -> (f64, f64) {
+    let PlanningProblem { world, method, conditions, .. } = *problem;
+    let pricer = Pricer::new(world, &conditions.noise, method.search, method.failure_cost_s);
+    let mut whole = (0.0, 1.0);
+    for index in from.unwrap_or(0)..plan.len().min(to + 1) {
+        let (leg, next) = (&plan[index], plan.get(index + 1).map(|next| &next.guide));
+        let (time_s, success) = pricer.price(leg, next).parts();
+        let is_cut = from == Some(index) || to == index;
+        let share = if is_cut { 0.5 } else { 1.0 };
+        whole = (whole.0 + share * time_s, whole.1 * libm::pow(success, share));
+    }
+    whole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(success: f64, episodes: f64) -> PlanPiece {
+        PlanPiece { until: 1.0, success, episodes, time_s: 5.0 }
+    }
+
+    #[test]
+    fn equal_pieces_tell_as_much_as_so_many_whole_runs() {
+        let odds = ComposedOdds::of(vec![piece(0.99, 500.0); 4]);
+        assert!((odds.success - 0.99_f64.powi(4)).abs() < 1e-12, "{odds:?}");
+        assert!((480.0..=500.0).contains(&odds.episodes), "{odds:?}");
+        assert!(odds.lower95 < odds.success && odds.success < odds.upper95, "{odds:?}");
+        assert_eq!(odds.time_s, 20.0);
+        let sure = ComposedOdds::of(vec![piece(1.0, 256.0), piece(1.0, 1024.0)]);
+        assert_eq!((sure.success, sure.episodes), (1.0, 256.0), "no better known than its weakest piece");
+        assert!(sure.lower95 < 0.99, "{sure:?}");
+    }
+
+    #[test]
+    fn what_is_left_shrinks_from_the_whole_to_nothing() {
+        let pieces = [1.5, 2.5, 4.0].map(|until| PlanPiece { until, ..piece(0.9, 100.0) });
+        let odds = ComposedOdds::of(pieces.to_vec());
+        assert_eq!(odds.rest((0, 0.0)), (odds.success, odds.time_s), "all of it");
+        let half_way = odds.rest((1, 0.5));
+        assert!((half_way.0 - 0.81).abs() < 1e-12 && (half_way.1 - 10.0).abs() < 1e-12, "{half_way:?}");
+        assert_eq!(odds.rest((3, 1.0)), (1.0, 0.0), "nothing");
+    }
+}
