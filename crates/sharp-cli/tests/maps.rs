@@ -1,5 +1,7 @@
 //! Maps and the places on them as a user gives them: saved, masked, coarser, by pixel, by scenario; goals in a row.
 
+#![allow(clippy::disallowed_methods, reason = "a variable says where real maps lie")]
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -57,6 +59,28 @@ fn a_saved_map_is_the_same_map_and_an_image_finds_its_description() {
     let output = sharp(folder.path(), &["map", "info", "hall.pgm", "--json"]);
     assert_eq!(json(&output)["map"]["hash"], hash("hall.yaml"));
     assert!(said(&output).contains("hall.yaml beside it"), "{}", said(&output));
+}
+
+#[test]
+fn maps_are_read_as_an_independent_program_reads_them() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        eprintln!("SKIPPED: there is no python3");
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    assert!(sharp(folder.path(), &["map", "save", "a", "--out", "a.yaml"]).status.success());
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/read_maps.py");
+    let mut python = Command::new("python3");
+    python.arg(script).arg(env!("CARGO_BIN_EXE_sharp")).arg(folder.path());
+    match std::env::var_os("SHARP_REAL_MAPS") {
+        Some(real) => drop(python.arg(real)),
+        None => eprintln!(
+            "SKIPPED: SHARP_REAL_MAPS names no folder of real maps, so the project's own is read alone"
+        ),
+    }
+    let output = python.output().expect("python3 runs");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && printed.contains("readings agree"), "{printed}{}", said(&output));
 }
 
 #[test]

@@ -207,4 +207,48 @@ mod tests {
         };
         assert_eq!(ridge(&mask, Cell::new(1, 1), Cell::new(3, 1), 1.0), None);
     }
+
+    /// The number in column `index` of a line of a MovingAI scenario.
+    fn number<T: std::str::FromStr>(line: &str, index: usize) -> T {
+        line.split('\t').nth(index).and_then(|word| word.trim().parse().ok()).expect("a sound scenario")
+    }
+
+    #[test]
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "real maps lie outside the repository, and the caller says where"
+    )]
+    fn lengths_are_optimal_where_clearance_is_free_and_bounded_where_it_is_not() {
+        let Some(folder) = std::env::var_os("SHARP_REAL_MAPS").map(std::path::PathBuf::from) else {
+            println!("skipped: SHARP_REAL_MAPS names no folder of real maps");
+            return;
+        };
+        let text = |name: &str| std::fs::read_to_string(folder.join("movingai").join(name)).expect("a file");
+        let (map, scenario) = (text("room-32-32-4.map"), text("room-32-32-4-even-1.scen"));
+        let drawing: Vec<String> = map.lines().skip(4).map(|row| row.replace(['@', 'T'], "#")).collect();
+        let grid = OccupancyGrid::from_ascii(1.0, &drawing.join("\n")).expect("a sound map");
+        let height = grid.frame().height;
+        let field = DistanceField::new(&grid);
+        let mask = TraversableMask { field: &field, allowed: &|_| true, least_m: 0.3, comfort_m: 2.5 };
+        let length_m = |line: &str, weight: f64| {
+            let cell = |at: usize| Cell::new(number(line, at), height - 1 - number::<usize>(line, at + 1));
+            let way = ridge(&mask, cell(4), cell(6), weight).expect("every problem has a way");
+            let step = |pair: &[Cell]| {
+                if pair[0].col == pair[1].col || pair[0].row == pair[1].row { 1.0 } else { 2.0_f64.sqrt() }
+            };
+            way.windows(2).map(step).sum::<f64>()
+        };
+        let problems: Vec<&str> = scenario.lines().skip(1).filter(|line| !line.trim().is_empty()).collect();
+        assert!(problems.len() > 100, "{} problems", problems.len());
+        for line in problems {
+            let optimal_m: f64 = number(line, 8);
+            assert!((length_m(line, 0.0) - optimal_m).abs() < 1e-4, "{line}: {}", length_m(line, 0.0));
+            // A metre costs 1 to 1 + weight, so that no way is longer than that many times the shortest.
+            let (weight, preferring_m) = (1.5, length_m(line, 1.5));
+            assert!(
+                (optimal_m - 1e-4..=(1.0 + weight) * optimal_m + 1e-4).contains(&preferring_m),
+                "{line}: {preferring_m} m with clearance preferred"
+            );
+        }
+    }
 }
