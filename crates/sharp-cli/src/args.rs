@@ -194,6 +194,9 @@ pub(crate) struct Solve {
     /// Drive there first, before the goal; may be repeated, in this order.
     #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true)]
     pub(crate) via: Vec<String>,
+    /// Arrive in the goal's heading, at most so many radians off [default: any heading will do].
+    #[arg(long, value_name = "RAD", conflicts_with = "via")]
+    pub(crate) goal_heading_tolerance: Option<f64>,
     /// Exit with 1 if the plan predicts less success than this; it is written all the same.
     #[arg(long, value_name = "P", default_value_t = 0.0)]
     pub(crate) min_success: f64,

@@ -84,20 +84,21 @@ pub(crate) enum HeadingRule {
     Free,
 }
 
-/// A pose typed as `X,Y,YAW` or `X Y YAW`; the yaw may be left out where it is free.
+/// A pose typed as `X,Y,YAW` or `X Y YAW`; the yaw may be left out where it is free, and is in degrees with `deg` behind it.
 pub(crate) fn pose(flag: &str, text: &str, heading: HeadingRule) -> Result<Pose, Failure> {
     let expected = match heading {
         HeadingRule::Needed => "three finite numbers X,Y,YAW",
         HeadingRule::Free => "finite numbers X,Y or X,Y,YAW",
     };
     let broken = || Failure::new("POSE_INVALID", format!("{flag} is {text:?}, expected {expected}"));
-    let parts: Vec<&str> =
-        if text.contains(',') { text.split(',').collect() } else { text.split_whitespace().collect() };
-    let numbers: Vec<f64> =
-        parts.iter().map(|part| part.trim().parse()).collect::<Result<_, _>>().map_err(|_| broken())?;
-    let (x, y, yaw) = match (&numbers[..], heading) {
-        (&[x, y, yaw], _) => (x, y, yaw),
-        (&[x, y], HeadingRule::Free) => (x, y, 0.0),
+    let number = |text: &str| text.parse::<f64>().map_err(|_| broken());
+    let angle = |text: &str| match text.strip_suffix("deg") {
+        Some(degrees) => number(degrees.trim()).map(f64::to_radians),
+        None => number(text),
+    };
+    let (x, y, yaw) = match (&parts(text)[..], heading) {
+        (&[x, y, yaw], _) => (number(x)?, number(y)?, angle(yaw)?),
+        (&[x, y], HeadingRule::Free) => (number(x)?, number(y)?, 0.0),
         _ => return Err(broken()),
     };
     let is_sane = |value: f64, limit: f64| value.is_finite() && value.abs() <= limit;
@@ -106,7 +107,9 @@ pub(crate) fn pose(flag: &str, text: &str, heading: HeadingRule) -> Result<Pose,
         return Err(broken());
     }
     if yaw.abs() > std::f64::consts::TAU + 1e-6 {
-        eprintln!("warning: {flag} has a yaw of {yaw}, more than a full turn: angles are radians");
+        eprintln!(
+            "warning: {flag} has a yaw of {yaw}, more than a full turn: angles are radians, or degrees as in 90deg"
+        );
     }
     Ok(Pose::new(x, y, yaw))
 }
@@ -177,6 +180,21 @@ pub(crate) fn query(map: &MapFile, args: &ProblemArgs) -> Result<Query, Failure>
             Err(Failure::new("USAGE", message))
         }
     }
+}
+
+/// Returns true if the goal that `args` ask for comes with a heading of its own.
+pub(crate) fn goal_has_heading(args: &ProblemArgs) -> bool {
+    match &args.goal {
+        Some(goal) => parts(goal).len() == 3,
+        None => args.problem.is_some() && args.scen.is_none(),
+    }
+}
+
+/// The numbers of a pose, still as text.
+fn parts(text: &str) -> Vec<&str> {
+    let parts: Vec<&str> =
+        if text.contains(',') { text.split(',').collect() } else { text.split_whitespace().collect() };
+    parts.into_iter().map(str::trim).collect()
 }
 
 /// A query that begins with the heading towards its goal.
@@ -256,6 +274,8 @@ mod tests {
             );
         }
         assert_eq!(pose("--goal", "1,2", HeadingRule::Free).unwrap(), Pose::new(1.0, 2.0, 0.0));
+        let degrees = pose("--goal", "1, 2, 90deg", HeadingRule::Free).unwrap();
+        assert!((degrees.heading.radians() - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{degrees:?}");
     }
 
     #[test]

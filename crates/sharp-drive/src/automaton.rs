@@ -8,7 +8,7 @@ use std::sync::Arc;
 use sharp_guide::{Departure, GuidePath, GuidedOption};
 use sharp_sim::RobotState;
 
-use crate::departure::careful;
+use crate::departure::{careful, turning};
 use crate::episode::{Decision, Motion};
 use crate::situation::{GuideProgress, GuideView, Observation, Situation};
 use crate::world::World;
@@ -165,16 +165,21 @@ impl Automaton {
         }
     }
 
-    /// What the robot has to do before a policy may drive: leave the tight place in which the plan begins. `None` as
-    /// soon as it has left.
+    /// What the robot has to do that no policy does: leave the tight place in which the plan begins, and turn in place at a
+    /// goal that asks for a heading. `None` where a policy drives.
     #[must_use]
-    pub fn leave(&self, world: &World) -> Option<Decision> {
+    pub fn maneuver(&self, world: &World) -> Option<Decision> {
         let Departure { back_off_m, careful_m } = self.link().option.departure;
         if self.actions == 0 && back_off_m > 0.0 {
             return Some(Decision::BackOff { distance_m: back_off_m });
         }
-        let is_leaving = self.progress.arc_m < careful_m;
-        is_leaving.then(|| Decision::Drive(careful(&self.situation(world))))
+        if self.progress.arc_m < careful_m {
+            return Some(Decision::Drive(careful(&self.situation(world))));
+        }
+        let (pose, goal) = (&self.observation.state.pose, self.link().option.target.goal()?);
+        let turns = world.robot.can_turn_in_place() && goal.contains(pose.position);
+        let turn_rad = goal.turn_left_rad(pose);
+        (turns && turn_rad != 0.0).then(|| Decision::Drive(turning(turn_rad)))
     }
 
     /// Returns true if the option that runs has used up its horizon.

@@ -89,7 +89,7 @@ impl Controller for ChainController<'_> {
         if self.automaton.is_late() {
             return Decision::Lost;
         }
-        if let Some(decision) = self.automaton.leave(self.world) {
+        if let Some(decision) = self.automaton.maneuver(self.world) {
             return decision;
         }
         let (index, situation) = (self.automaton.index(), self.automaton.situation(self.world));

@@ -222,7 +222,7 @@ impl RunningTask {
         episode.begin(start, seed, number);
         let mut automaton = Automaton::new(links, Observation::first(start, &noise).without_slip_estimate());
         // The learner begins where its guide does.
-        while let Some(decision) = automaton.leave(&world).filter(|_| !automaton.is_late()) {
+        while let Some(decision) = automaton.maneuver(&world).filter(|_| !automaton.is_late()) {
             let Ok(motion) = episode.carry_out(decision) else { break };
             automaton.observe(&world, &motion);
         }

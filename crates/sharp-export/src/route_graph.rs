@@ -256,6 +256,7 @@ fn guide(
         start: center(spec.initiation),
         end: center(spec.termination),
         heading: None,
+        goal_heading: None,
     };
     let space = abstraction.space(method.search.allowed);
     let mut rng = seed.stream(&format!("guide {id}"), 0);

@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
-use sharp_space::{Cell, DistanceField, GridFrame, Point};
+use sharp_space::{Cell, DistanceField, GridFrame, Heading, Point, Pose};
 
 /// Clearance beside the outline with which a robot arrives easily, metres.
 const EASY_M: f64 = 0.2;
@@ -17,6 +17,8 @@ pub struct Goal {
     pub point: Point,
     /// Distance within which it counts as reached, metres.
     pub radius_m: f64,
+    /// The heading in which the robot has to stand there, and how far off it may be, radians; `None` for any.
+    pub heading: Option<(Heading, f64)>,
     /// Cells within that distance which no free way inside it joins to the goal: those behind a wall.
     cut_off: Arc<BTreeSet<Cell>>,
     frame: GridFrame,
@@ -42,10 +44,31 @@ impl Goal {
             }
         }
         let cut_off = near.difference(&joined).copied().filter(|&cell| clearance.at(cell) > 0.0).collect();
-        Self { point, radius_m, cut_off: Arc::new(cut_off), frame }
+        Self { point, radius_m, heading: None, cut_off: Arc::new(cut_off), frame }
     }
 
-    /// Returns true if a robot at `point` has arrived: nearer than the radius, and not behind a wall.
+    /// The same, where the robot has to stand in the direction of `heading`, at most `tolerance_rad` off.
+    #[must_use]
+    pub fn with_heading(self, heading: Heading, tolerance_rad: f64) -> Self {
+        Self { heading: Some((heading, tolerance_rad)), ..self }
+    }
+
+    /// Returns true if a robot at `pose` has arrived: at the place, and in the direction that is asked for.
+    #[must_use]
+    pub fn is_reached(&self, pose: &Pose) -> bool {
+        self.contains(pose.position) && self.turn_left_rad(pose) == 0.0
+    }
+
+    /// How far a robot at `pose` has to turn for the direction that is asked for, radians, left positive; 0 where it stands
+    /// well enough.
+    #[must_use]
+    pub fn turn_left_rad(&self, pose: &Pose) -> f64 {
+        let Some((heading, tolerance_rad)) = self.heading else { return 0.0 };
+        let turn_rad = pose.heading.turn_to(heading);
+        if turn_rad.abs() <= tolerance_rad { 0.0 } else { turn_rad }
+    }
+
+    /// Returns true if `point` is at the place: nearer than the radius, and not behind a wall.
     #[must_use]
     pub fn contains(&self, point: Point) -> bool {
         let is_near = (point - self.point).norm() < self.radius_m;
@@ -109,6 +132,18 @@ mod tests {
         assert!(goal.contains(Point::new(1.9, 1.0)), "beside it");
         assert!(!goal.contains(Point::new(1.4, 1.0)), "0.3 m away behind the wall");
         assert!(!goal.contains(Point::new(2.2, 1.0)), "0.5 m away");
+    }
+
+    #[test]
+    fn a_heading_is_asked_for_on_request_only() {
+        let field = rooms();
+        let goal = Goal::new(Point::new(2.3, 1.0), 0.4, &field);
+        let at = |heading: f64| Pose::new(2.2, 1.0, heading);
+        assert!(goal.is_reached(&at(2.0)), "any heading");
+        let goal = goal.with_heading(Heading::new(3.0), 0.3);
+        assert_eq!([2.6, 2.8, -3.1].map(|heading| goal.is_reached(&at(heading))), [false, true, true]);
+        assert!((goal.turn_left_rad(&at(2.0)) - 1.0).abs() < 1e-12, "a radian to the left");
+        assert!(!goal.is_reached(&Pose::new(1.5, 1.0, 3.0)), "the place counts as before");
     }
 
     #[test]

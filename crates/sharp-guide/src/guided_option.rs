@@ -83,12 +83,12 @@ impl fmt::Display for LegId {
 pub enum Target {
     /// An endpoint region β (definitions 3 and 5).
     Endpoint(Endpoint),
-    /// The goal configuration, heading free.
+    /// The goal configuration.
     Goal(Goal),
 }
 
 impl Target {
-    /// Returns true if a robot at `point` has arrived.
+    /// Returns true if `point` is at the place where it ends.
     #[must_use]
     pub fn contains(&self, point: Point, states: &dyn StateAbstraction) -> bool {
         match self {
@@ -103,6 +103,15 @@ impl Target {
         match self {
             Self::Endpoint(endpoint) => Some(endpoint),
             Self::Goal(_) => None,
+        }
+    }
+
+    /// The goal, unless it is an endpoint.
+    #[must_use]
+    pub const fn goal(&self) -> Option<&Goal> {
+        match self {
+            Self::Endpoint(_) => None,
+            Self::Goal(goal) => Some(goal),
         }
     }
 
@@ -209,7 +218,10 @@ impl GuidedOption {
     /// Returns true if a robot at `pose` has finished the option: x ∈ β.
     #[must_use]
     pub fn is_done(&self, pose: &Pose) -> bool {
-        self.target.contains(pose.position, &*self.states)
+        match &self.target {
+            Target::Endpoint(endpoint) => endpoint.contains(pose.position, &*self.states),
+            Target::Goal(goal) => goal.is_reached(pose),
+        }
     }
 
     /// Returns true if a robot at `pose` is where the option may be: the complement of the second case of

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use sharp_space::{Cell, Point, Pose};
+use sharp_space::{Cell, Heading, Point, Pose};
 
 use crate::guided_option::GuidedOption;
 use crate::inflate::GuideRobot;
@@ -64,7 +64,7 @@ fn joined(
     };
     let request = GuideRequest {
         start: GuideEnd { position: way[0], heading: Some(start.heading) },
-        goal: GuideEnd { position: way[way.len() - 1], heading: None },
+        goal: GuideEnd { position: way[way.len() - 1], heading: goal_heading(&options[options.len() - 1]) },
         allowed: &allowed,
     };
     let disc = |option: &Arc<GuidedOption>| {
@@ -77,6 +77,11 @@ fn joined(
     })?;
     let pieces = cuts.windows(2).map(|ends| piece(&path, ends[0], ends[1], settings.spacing_m));
     pieces.collect()
+}
+
+/// The direction in which `option` should arrive, where it ends at a goal that asks for one.
+fn goal_heading(option: &GuidedOption) -> Option<Heading> {
+    option.target.goal()?.heading.map(|(heading, _)| heading)
 }
 
 /// Where `path` passes from one option to the next, metres, with both of its ends; `None` if it misses a set.

@@ -24,6 +24,7 @@
 
 pub mod conformance;
 
+mod arrival;
 mod band;
 mod context;
 mod crossing;
@@ -43,6 +44,7 @@ mod sampled;
 mod settings;
 mod traversable;
 
+pub use arrival::arriving;
 pub use crossing::crossing_heading;
 pub use departure::{Departure, departures, is_tight};
 pub use goal::Goal;

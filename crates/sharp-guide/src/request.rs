@@ -60,6 +60,8 @@ pub struct UnguidedOption {
     pub end: Point,
     /// The robot's heading, for an option from the initial configuration.
     pub heading: Option<Heading>,
+    /// The direction in which it should arrive at a goal that asks for one.
+    pub goal_heading: Option<Heading>,
 }
 
 impl UnguidedOption {
@@ -98,7 +100,10 @@ impl UnguidedOption {
         };
         let request = GuideRequest {
             start: GuideEnd { position: self.start, heading: start_heading },
-            goal: GuideEnd { position: self.end, heading: crossing(target, self.to) },
+            goal: GuideEnd {
+                position: self.end,
+                heading: self.goal_heading.or_else(|| crossing(target, self.to)),
+            },
             allowed: &allowed,
         };
         planner.plan(&request, robot, rng)

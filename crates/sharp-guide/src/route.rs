@@ -28,27 +28,31 @@ pub fn routes<'a>(
     // Where the robot itself finds no way, one with a margin need not search.
     let has_way = OnceCell::new();
     robot.inflated_at(Some(start)).filter_map(move |robot| {
-        ridge(&robot, start, goal).or_else(|| {
+        ridge(&robot, start, (goal, None)).or_else(|| {
             let has_way = has_way.get_or_init(|| searched(&without_margin, start, goal, &settings).is_some());
             has_way.then(|| searched(&robot, start, goal, &settings)).flatten()
         })
     })
 }
 
-/// The same without the search by hybrid A*: quick, and blind in places where a way must be found by manoeuvring.
+/// The same without the search by hybrid A*, arriving in the direction of `heading` where there is room: quick, and blind in places where a way must be found by manoeuvring.
 pub fn ridge_routes<'a>(
     robot: &GuideRobot<'a>,
     start: Pose,
-    goal: Point,
+    (goal, heading): (Point, Option<Heading>),
 ) -> impl Iterator<Item = GuidePath> + use<'a> {
-    robot.inflated_at(Some(start)).filter_map(move |robot| ridge(&robot, start, goal))
+    robot.inflated_at(Some(start)).filter_map(move |robot| ridge(&robot, start, (goal, heading)))
 }
 
 /// Along the ridge of clearance.
-fn ridge(robot: &GuideRobot<'_>, start: Pose, goal: Point) -> Option<GuidePath> {
+fn ridge(
+    robot: &GuideRobot<'_>,
+    start: Pose,
+    (goal, heading): (Point, Option<Heading>),
+) -> Option<GuidePath> {
     let request = GuideRequest {
         start: GuideEnd { position: start.position, heading: Some(start.heading) },
-        goal: GuideEnd { position: goal, heading: None },
+        goal: GuideEnd { position: goal, heading },
         allowed: &|_| true,
     };
     // No sampling: hybrid A* finds shorter paths, and finds them always.

@@ -135,7 +135,7 @@ fn guided(space: &OptionSpace, spec: &OptionSpec, checker: &FootprintChecker) ->
     let center = |endpoint| space.options.endpoint(endpoint).center;
     let (start, end) = (center(spec.initiation), center(spec.termination));
     let (id, from, to) = (LegId::Option(spec.id), spec.id.from(), spec.id.to());
-    let option = UnguidedOption { id, from, to, start, end, heading: None };
+    let option = UnguidedOption { id, from, to, start, end, heading: None, goal_heading: None };
     let (robot, mut rng) = (GuideRobot::new(checker, HUSKY), Seed(1).stream("guide", 0));
     let guide = option
         .plan_guide(space, &robot, &ClearanceSearch::default(), &mut rng)

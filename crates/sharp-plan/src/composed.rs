@@ -136,7 +136,7 @@ impl ComposedPolicy {
 
     /// The decision of the option's policy, whether or not its end is reached.
     pub(crate) fn drive(&mut self) -> Decision {
-        if let Some(decision) = self.automaton.leave(&self.plan.world) {
+        if let Some(decision) = self.automaton.maneuver(&self.plan.world) {
             return decision;
         }
         let (index, situation) = (self.automaton.index(), self.automaton.situation(&self.plan.world));

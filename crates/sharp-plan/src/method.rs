@@ -111,6 +111,9 @@ pub struct SearchSettings {
     pub bypasses: bool,
     /// A plan may also go from start to goal without any option, where that is cheaper; false keeps to the paper's.
     pub direct: bool,
+    /// How far off the goal's heading the robot may stand at the end, radians; `None` where any heading will do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal_heading_tolerance_rad: Option<f64>,
     /// A robot that stands in a tight place may back off or drive an arc before its guide begins; false keeps to the
     /// paper's.
     #[serde(default = "yes")]
@@ -147,6 +150,7 @@ impl Default for SearchSettings {
             bypass_surcharge_s: 14.0,
             bypasses: true,
             direct: true,
+            goal_heading_tolerance_rad: None,
             departures: true,
             direct_routes: 7,
             unguided_speed: 1.0,

@@ -164,6 +164,7 @@ fn option_candidate(options: &OptionSet, spec: &OptionSpec) -> Candidate {
             start: center(spec.initiation),
             end: center(spec.termination),
             heading: None,
+            goal_heading: None,
         },
         is_bypass: matches!(spec.id, OptionId::Bypass { .. }),
         endpoint: Some(spec.termination),
@@ -179,7 +180,15 @@ fn first_legs(
     (goal, goal_state): (Pose, StateId),
 ) -> Vec<Candidate> {
     let heading = Some(start.heading);
-    let leg = |id, to, end| UnguidedOption { id, from, to, start: start.position, end, heading };
+    let leg = |id, to, end| UnguidedOption {
+        id,
+        from,
+        to,
+        start: start.position,
+        end,
+        heading,
+        goal_heading: None,
+    };
     let mut legs = Vec::new();
     let direct = leg(LegId::Direct, goal_state, goal.position);
     legs.push(Candidate { option: direct, is_bypass: false, endpoint: None });
@@ -208,7 +217,7 @@ fn last_legs(
         let id = LegId::Last(endpoint_id.0, from);
         let (start, end) = (endpoint.center, goal.position);
         Candidate {
-            option: UnguidedOption { id, from, to, start, end, heading: None },
+            option: UnguidedOption { id, from, to, start, end, heading: None, goal_heading: None },
             is_bypass: is_centroid_elsewhere(endpoint, to),
             endpoint: Some(endpoint_id),
         }

@@ -19,6 +19,7 @@ use crate::method::{Method, SearchSettings};
 use crate::odds::ComposedOdds;
 use crate::price::Pricer;
 use crate::query::Query;
+use crate::search::goal_of;
 use crate::verify::{PlannedOption, Solution};
 
 const PLAN_FILE: &str = "plan.ron";
@@ -218,8 +219,7 @@ impl Plan {
             Some(limits) => world.with_speed_limits(limits),
             None => world,
         };
-        let tolerance_m = world.robot.goal_tolerance_m;
-        let goal = Goal::new(file.goal.position, tolerance_m, world.geometry.clearance());
+        let goal = goal_of(file.goal, &world, method.search.goal_heading_tolerance_rad);
         let steps = file.steps.into_iter().map(|step| planned_option(step, folder, &space, goal.clone()));
         let steps = steps.collect::<Result<Vec<_>, _>>()?;
         if steps.is_empty() {

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use sharp_drive::{Driver, InitialStates, SuccessEstimate, World};
 use sharp_guide::{
     Departure, Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption,
-    departures, is_tight, ridge_routes, routes,
+    arriving, departures, is_tight, ridge_routes, routes,
 };
 use sharp_options::OptionId;
 use sharp_rbvd::{StateAbstraction, StateId};
@@ -101,7 +101,7 @@ impl<'a> Search<'a> {
         let start = state_near(&**states, query.start.position).ok_or(Unplaced::Start)?;
         let goal = state_near(&**states, query.goal.position).ok_or(Unplaced::Goal)?;
         let clearance = world.geometry.clearance();
-        let disc = Goal::new(query.goal.position, world.robot.goal_tolerance_m, clearance);
+        let disc = goal_of(query.goal, world, method.search.goal_heading_tolerance_rad);
         let end = disc.easiest_end(clearance, world.robot.footprint.inscribed_radius_m());
         let end = Pose::at(end, query.goal.heading);
         let graph = OptionGraph::new(&**states, options, (query.start, start), (end, goal));
@@ -391,6 +391,9 @@ impl<'a> Search<'a> {
 
     fn plan_guide(&self, option: &UnguidedOption) -> Result<GuidePath, NoGuide> {
         let mut rng = self.seed.stream(&format!("guide {}", option.id), 0);
+        let ends_there = matches!(option.id, LegId::Last(..) | LegId::Direct);
+        let goal_heading = self.goal.heading.filter(|_| ends_there).map(|(heading, _)| heading);
+        let option = UnguidedOption { goal_heading, ..*option };
         option.plan_guide(&self.space, &self.world.guide_robot(), self.guides, &mut rng)
     }
 
@@ -399,7 +402,8 @@ impl<'a> Search<'a> {
         let robot = self.world.guide_robot();
         let price_s =
             |guide: &GuidePath| self.pricer.cost_s(&self.pricer.of_guide(LegId::Direct, guide, None), None);
-        let routes_in = ridge_routes(&robot, start, end).take(self.settings.direct_routes);
+        let heading = self.goal.heading.map(|(heading, _)| heading);
+        let routes_in = ridge_routes(&robot, start, (end, heading)).take(self.settings.direct_routes);
         let cheapest = routes_in.min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
         let is_patient = self.settings.direct_routes > 1;
         let goal = (end, 0.5 * self.goal.radius_m);
@@ -408,12 +412,27 @@ impl<'a> Search<'a> {
 
     fn guided(&self, candidate: &Candidate, guide: GuidePath) -> GuidedOption {
         let (option, goal) = (&candidate.option, self.goal.clone());
+        let guide = self.arriving(candidate.id(), guide);
         GuidedOption::new(&self.space, option.id, (option.from, option.to), guide, goal)
+    }
+
+    /// The guide of the leg called `id`, which for a car arrives in the direction that the goal asks for, where it can.
+    fn arriving(&self, id: LegId, guide: GuidePath) -> GuidePath {
+        let ends_there = matches!(id, LegId::Last(..) | LegId::Direct);
+        let is_off = ends_there && self.goal.turn_left_rad(&guide.end()) != 0.0;
+        match self.goal.heading {
+            Some((heading, _)) if is_off && !self.world.robot.can_turn_in_place() => {
+                arriving(&self.world.guide_robot(), &guide, heading).unwrap_or(guide)
+            }
+            _ => guide,
+        }
     }
 
     /// Returns true if there is nothing to do: the start lies in the goal.
     fn is_there(&self) -> bool {
-        self.goal.contains(self.query.start.position)
+        // A robot that turns in place does so where it stands.
+        let may_turn = self.world.robot.can_turn_in_place();
+        self.goal.is_reached(&self.query.start) || (may_turn && self.goal.contains(self.query.start.position))
     }
 }
 
@@ -421,6 +440,15 @@ impl<'a> Search<'a> {
 fn guide_of_nothing(start: Pose, spacing_m: f64) -> Result<GuidePath, NoGuide> {
     let end = Pose::at(start.position + start.heading.unit() * (0.5 * spacing_m), start.heading);
     GuidePath::new(vec![start, end], spacing_m).map_err(|_| NoGuide::NoLength(start.position))
+}
+
+/// The goal at `pose` for the robot of `world`, which asks for the heading where there is a tolerance for it.
+pub(crate) fn goal_of(pose: Pose, world: &World, heading_tolerance_rad: Option<f64>) -> Goal {
+    let goal = Goal::new(pose.position, world.robot.goal_tolerance_m, world.geometry.clearance());
+    match heading_tolerance_rad {
+        Some(tolerance_rad) => goal.with_heading(pose.heading, tolerance_rad),
+        None => goal,
+    }
 }
 
 /// α(x), or the state of the nearest cell that has one nearby.

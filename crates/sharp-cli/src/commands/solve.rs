@@ -121,6 +121,7 @@ fn method(args: &Solve) -> Result<Method, Failure> {
     let mut method = Method::by_name(args.learning.name()).expect("every word names a method");
     method.search.cost_update = args.cost_update == Switch::On;
     method.failure_cost_s = args.failure_cost;
+    method.search.goal_heading_tolerance_rad = heading_tolerance(args)?;
     if args.verify != "auto" {
         let episodes = args.verify.parse().ok().filter(|episodes| (0..=EPISODES_MAX).contains(episodes));
         let usage = || {
@@ -132,6 +133,22 @@ fn method(args: &Solve) -> Result<Method, Failure> {
     }
     let method = if args.guide == Guide::Paper { method.with_learn_and_link() } else { method };
     Ok(if method.verify_episodes == 0 { method.composed() } else { method })
+}
+
+/// How far off the goal's heading the robot may stand, radians; `None` where any will do.
+fn heading_tolerance(args: &Solve) -> Result<Option<f64>, Failure> {
+    let Some(tolerance_rad) = args.goal_heading_tolerance else { return Ok(None) };
+    let refused = |problem: &str| {
+        let message = format!("--goal-heading-tolerance is {tolerance_rad}, {problem}");
+        Err(Failure::new("USAGE", message))
+    };
+    if !(0.05..=std::f64::consts::PI).contains(&tolerance_rad) {
+        return refused("expected radians from 0.05 to 3.14");
+    }
+    if !input::goal_has_heading(&args.problem) {
+        return refused("but the goal has no heading: --goal X,Y,YAW");
+    }
+    Ok(Some(tolerance_rad))
 }
 
 /// Writes the page of the plan in `folder` where it is wanted, and says where it is.

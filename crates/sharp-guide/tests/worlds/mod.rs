@@ -128,7 +128,7 @@ impl Drawn {
         };
         let heading = source.is_none().then_some(start.heading);
         let (start, end) = (source.map_or(start.position, center), target.map_or(goal, center));
-        UnguidedOption { id, from, to, start, end, heading }
+        UnguidedOption { id, from, to, start, end, heading, goal_heading: None }
     }
 
     fn id(&self, name: &str, goal: StateId) -> LegId {
