@@ -6,7 +6,7 @@ use sharp_drive::EpisodeEnd;
 use sharp_guide::{Departure, is_tight};
 use sharp_options::OptionKind;
 use sharp_plan::{
-    Conditions, Method, OptionLibrary, Outcome, Plan, PlanningProblem, Query, RunSettings, Solution, run,
+    Conditions, Method, OptionLibrary, Outcome, Plan, PlanningProblem, Query, RunSettings, Solution, record,
     solve,
 };
 use sharp_sim::{NoiseModel, RobotModel};
@@ -43,8 +43,19 @@ fn room((width_m, height_m): (f64, f64), walls: &[[f64; 4]]) -> OccupancyGrid {
 
 /// Solves `query` in `grid`, and drives the plan thirty times.
 fn solved(grid: OccupancyGrid, robot: RobotModel, query: Query) -> (TestWorld, Solution, usize) {
+    let (world, solution, ends) = driven(grid, robot, query, Method::fast());
+    (world, solution, ends.len())
+}
+
+/// The same by `method`; gives the poses in which the drives that reached the goal end.
+fn driven(
+    grid: OccupancyGrid,
+    robot: RobotModel,
+    query: Query,
+    method: Method,
+) -> (TestWorld, Solution, Vec<Pose>) {
     let world = TestWorld::with_one_region(grid, robot, OptionKind::Interface);
-    let (method, noise) = (Method::fast(), NoiseModel::nominal());
+    let noise = NoiseModel::nominal();
     let conditions = Conditions::new(&world.world, noise.clone());
     let problem = PlanningProblem {
         world: &world.world,
@@ -64,9 +75,10 @@ fn solved(grid: OccupancyGrid, robot: RobotModel, query: Query) -> (TestWorld, S
         seed: Seed(1),
         solution: (*solution).clone(),
     });
-    let runs = run(&plan, &RunSettings::new(&plan, 30, Seed(2)), &|| 0.0);
-    let reached = runs.iter().filter(|run| run.end == EpisodeEnd::Reached).count();
-    (world, *solution, reached)
+    let runs = record(&plan, &RunSettings::new(&plan, 30, Seed(2)), &|| 0.0);
+    let reached = runs.iter().filter(|run| run.execution.end == EpisodeEnd::Reached);
+    let ends = reached.map(|run| run.moments[run.moments.len() - 1].state.pose).collect();
+    (world, *solution, ends)
 }
 
 /// From `start` to `goal` (x, y, yaw).
@@ -138,5 +150,20 @@ fn at_its_goal_a_robot_stays_whatever_its_heading() {
         let query = from_to([2.0, 2.0, 0.0], [2.05, 2.0, heading]);
         let (_, solution, reached) = solved(room((4.0, 4.0), &[]), RobotModel::husky(), query);
         assert_eq!((solution.predicted.failures(), solution.predicted_time_s, reached), (0, 0.0, 30));
+    }
+}
+
+#[test]
+fn a_goal_that_asks_for_a_heading_is_reached_in_it() {
+    for (robot, heading) in [(RobotModel::husky(), 2.5), (RobotModel::limo(), -1.5)] {
+        let mut method = Method::fast();
+        method.search.goal_heading_tolerance_rad = Some(0.3);
+        let (name, query) = (robot.name.clone(), from_to([1.5, 2.5, 0.0], [5.0, 2.5, heading]));
+        let (_, solution, ends) = driven(room((8.0, 5.0), &[]), robot, query, method);
+        assert!(solution.predicted.rate() > 0.9 && ends.len() >= 27, "{name}: {:?}", solution.predicted);
+        for end in ends {
+            let off_rad = end.heading.turn_to(query.goal.heading).abs();
+            assert!(off_rad <= 0.3, "{name}: {off_rad} rad off");
+        }
     }
 }
