@@ -100,7 +100,7 @@ fn unguided(option: &OptionSpec, world: &TestWorld) -> UnguidedOption {
     let center = |endpoint| world.abstraction.options.endpoint(endpoint).center;
     let (id, from, to) = (LegId::Option(option.id), option.id.from(), option.id.to());
     let (start, end) = (center(option.initiation), center(option.termination));
-    UnguidedOption { id, from, to, start, end, heading: None }
+    UnguidedOption { id, from, to, start, end, heading: None, goal_heading: None }
 }
 
 #[test]

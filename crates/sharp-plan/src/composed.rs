@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use sharp_drive::{
-    Automaton, Controller, Decision, Follower, Link, Motion, Observation, OptionPolicy, Policy,
+    Automaton, Command, Controller, Decision, Follower, Link, Motion, Observation, OptionPolicy, Policy,
     StandstillDetector,
 };
 use sharp_guide::{GuidedOption, LegId};
@@ -145,7 +145,10 @@ impl ComposedPolicy {
             self.entered = index + 1;
             policy.enter(&situation);
         }
-        Decision::Drive(policy.decide(&situation))
+        let command = policy.decide(&situation);
+        // Simulated robots keep to their top speed by themselves. One outside does what it is told.
+        let speed_mps = command.speed_mps.min(self.plan.world.robot.max_speed_mps);
+        Decision::Drive(Command { speed_mps, ..command })
     }
 
     /// A new plan from here; false if there is none, or too many were made.

@@ -201,7 +201,7 @@ impl TourPolicy {
     pub fn new(mut plans: Vec<Arc<Plan>>, state: RobotState, recovery: bool) -> Self {
         plans.reverse();
         let first = plans.pop().expect("a tour has a plan");
-        let current = ComposedPolicy::new(first, state, recovery);
+        let current = begin(first, state, recovery);
         Self {
             to_come: plans,
             current,
@@ -255,6 +255,16 @@ impl TourPolicy {
     }
 }
 
+/// The policy of `plan` for a robot in `state`, which finds its own way where that is not the plan's start.
+fn begin(plan: Arc<Plan>, state: RobotState, recovery: bool) -> ComposedPolicy {
+    let start = plan.solution.query.start;
+    let (within_m, within_rad) = START_WITHIN;
+    let is_there = state.pose.distance_m(&start) < within_m
+        && state.pose.heading.turn_to(start.heading).abs() < within_rad;
+    let begin = if is_there { ComposedPolicy::new } else { ComposedPolicy::arriving };
+    begin(plan, state, recovery)
+}
+
 impl Controller for TourPolicy {
     fn decide(&mut self) -> Decision {
         loop {
@@ -270,11 +280,6 @@ impl Controller for TourPolicy {
             self.before = self.events();
             self.since_reached = (0, f64::INFINITY);
             let state = self.current.observation().state;
-            let start = next.solution.query.start;
-            let (within_m, within_rad) = START_WITHIN;
-            let is_there = state.pose.distance_m(&start) < within_m
-                && state.pose.heading.turn_to(start.heading).abs() < within_rad;
-            let begin = if is_there { ComposedPolicy::new } else { ComposedPolicy::arriving };
             self.current = begin(next, state, self.recovery);
         }
     }

@@ -35,8 +35,10 @@ pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
     let plan = &tour.plans[0];
     let mut driver: Option<RemoteDriver> = None;
     let mut out = std::io::stdout().lock();
-    for (index, line) in std::io::stdin().lock().lines().enumerate() {
+    for (index, line) in std::io::stdin().lock().split(b'\n').enumerate() {
         let line = line.map_err(|error| Failure::new("INPUT", format!("line {}: {error}", index + 1)))?;
+        // Bytes that are no text make a broken line, not the end.
+        let line = String::from_utf8_lossy(&line);
         if line.trim().is_empty() {
             continue;
         }

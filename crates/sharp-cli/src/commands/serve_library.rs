@@ -59,8 +59,10 @@ pub(crate) fn run(args: &Serve, seed: u64) -> Result<Exit, Failure> {
         );
     }
     let mut out = std::io::stdout().lock();
-    for (index, line) in std::io::stdin().lock().lines().enumerate() {
+    for (index, line) in std::io::stdin().lock().split(b'\n').enumerate() {
         let line = line.map_err(|error| Failure::new("INPUT", format!("line {}: {error}", index + 1)))?;
+        // Bytes that are no text make a broken line, not the end.
+        let line = String::from_utf8_lossy(&line);
         if line.trim().is_empty() {
             continue;
         }
