@@ -203,14 +203,14 @@ mod tests {
         let first = &mut plan.solution.steps[0].option;
         let departure = Departure { back_off_m: 0.3, careful_m: 0.0 };
         *first = Arc::new((**first).clone().with_departure(departure));
-        let start = at(1.3, 2.2);
+        let start = at(1.0, 2.2);
         let mut driver = RemoteDriver::new(vec![Arc::new(plan)], &start, true);
-        let answers = [1.3, 1.15, 1.02, 1.0].map(|x| driver.answer(&at(x, 2.2)));
+        let answers = [1.0, 0.85, 0.72, 0.7].map(|x| driver.answer(&at(x, 2.2)));
         let speeds = answers.map(|answer| answer.speed_mps);
         assert!(speeds[..2].iter().all(|&speed| speed == -BACK_OFF_MPS), "backwards: {speeds:?}");
         assert!(speeds[2..].iter().all(|&speed| speed > 0.0), "then on: {speeds:?}");
         let behind = answers[1].waypoint.expect("a place behind it");
-        assert!((behind.position.x - 1.0).abs() < 1e-9, "so much is left: {behind:?}");
+        assert!((behind.position.x - 0.7).abs() < 1e-9, "so much is left: {behind:?}");
         assert!(answers.iter().all(|answer| answer.status == RemoteStatus::Running), "as planned");
     }
 
@@ -220,8 +220,8 @@ mod tests {
         let first = &mut plan.solution.steps[0].option;
         let departure = Departure { back_off_m: 0.3, careful_m: 0.0 };
         *first = Arc::new((**first).clone().with_departure(departure));
-        let mut driver = RemoteDriver::new(vec![Arc::new(plan)], &at(1.3, 2.2), true);
-        let asked = (0..20).take_while(|_| driver.answer(&at(1.3, 2.2)).speed_mps < 0.0).count();
+        let mut driver = RemoteDriver::new(vec![Arc::new(plan)], &at(1.0, 2.2), true);
+        let asked = (0..20).take_while(|_| driver.answer(&at(1.0, 2.2)).speed_mps < 0.0).count();
         assert!((2..10).contains(&asked), "asked {asked} times");
     }
 }
