@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(backs.len(), 4, "0.1 m to 0.4 m: {ways:?}");
         assert!(
             ways.iter().all(|(departure, _)| departure.careful_m == 0.0),
-            "no arc leads through the wall"
+            "no curve leads through the wall"
         );
         let (furthest, lead) = &ways[3];
         assert!((lead[0].position.x - 4.92).abs() < 1e-9, "{furthest:?} ends at {:?}", lead[0]);
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_close_beside_a_wall_leaves_it_on_an_arc() {
+    fn a_robot_close_beside_a_wall_leaves_it_on_a_curve() {
         let checker = room();
         let robot = GuideRobot::new(&checker, Steering::RotateTranslate);
         // The wall is 3 cm to the right.

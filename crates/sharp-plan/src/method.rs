@@ -114,7 +114,7 @@ pub struct SearchSettings {
     /// How far off the goal's heading the robot may stand at the end, radians; `None` where any heading will do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal_heading_tolerance_rad: Option<f64>,
-    /// A robot that stands in a tight place may back off or drive an arc before its guide begins; false keeps to the
+    /// A robot that stands in a tight place may back off or drive a curve before its guide begins; false keeps to the
     /// paper's.
     #[serde(default = "yes")]
     pub departures: bool,
