@@ -178,15 +178,7 @@ impl<'a> MonteCarlo<'a> {
         start: RobotState,
         is_enough: impl Fn(&[ChainRun]) -> bool,
     ) -> Vec<ChainRun> {
-        let mut runs = Vec::with_capacity(self.episodes as usize);
-        while runs.len() < self.episodes as usize && (runs.is_empty() || !is_enough(&runs)) {
-            let next = runs.len() as u32;
-            let block = next..self.episodes.min(next + BLOCK);
-            runs.extend(self.parallel(drivers, block, |chain, episode, number| {
-                chain.run(self.world, episode, start, (self.seed, number))
-            }));
-        }
-        runs
+        self.runs_from(drivers, &InitialStates::exactly(start), is_enough)
     }
 
     /// Results come in the order of the episodes, whatever thread ran them.
