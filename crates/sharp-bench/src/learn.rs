@@ -14,7 +14,7 @@ use sharp_sim::NoiseModel;
 use sharp_space::{Cell, GridFrame, Point, Seed};
 
 use crate::error::BenchError;
-use crate::named::{InputError, noise, robot};
+use crate::named::{self, InputError, noise, robot};
 use crate::pictures;
 use crate::reports::MapReport;
 use crate::solve::{SolveSettings, prepare};
@@ -45,7 +45,7 @@ impl NamedWorld {
     pub fn new(map: &MapFile, robot_name: &str, noise_name: &str) -> Result<Self, InputError> {
         Ok(Self {
             map: map.name.clone(),
-            world: World::new(map.grid.clone(), robot(robot_name)?),
+            world: named::world(map, robot(robot_name)?),
             noise: noise_name.to_owned(),
             noise_model: noise(noise_name)?,
         })

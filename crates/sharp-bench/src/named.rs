@@ -100,12 +100,22 @@ impl NamedProblem {
     pub fn new(map: &MapFile, query: Query, robot_name: &str, noise_name: &str) -> Result<Self, InputError> {
         Ok(Self {
             map: map.name.clone(),
-            world: World::new(map.grid.clone(), robot(robot_name)?),
+            world: world(map, robot(robot_name)?),
             query,
             noise: noise_name.to_owned(),
             noise_model: noise(noise_name)?,
         })
     }
+}
+
+/// `robot` in `map`. Where a cell is wider than the robot, the map is drawn finer: ways, states and distances are only as
+/// fine as the cells.
+#[must_use]
+pub fn world(map: &MapFile, robot: RobotModel) -> World {
+    let inscribed_m = robot.footprint.inscribed_radius_m();
+    let is_coarse = map.grid.frame().resolution_m > 2.0 * inscribed_m;
+    let grid = if is_coarse { map.grid_with_cells(inscribed_m) } else { map.grid.clone() };
+    World::new(grid, robot)
 }
 
 /// What is expected in place of an unknown robot.
@@ -197,6 +207,8 @@ fn read_text(file: &str, what: &'static str, expected: &'static str) -> Result<S
 
 #[cfg(test)]
 mod tests {
+    use sharp_space::OccupancyGrid;
+
     use super::*;
 
     #[test]
@@ -208,6 +220,22 @@ mod tests {
         );
         assert_eq!(noise("nominal*-1").expect_err("a broken factor").code(), "NOISE_INVALID");
         assert_eq!(noise("loud").expect_err("unknown").code(), "FILE_UNREADABLE");
+    }
+
+    #[test]
+    fn cells_wider_than_the_robot_are_divided() {
+        let map = |resolution_m: f64| MapFile {
+            name: "drawn".to_owned(),
+            grid: OccupancyGrid::from_ascii(resolution_m, "...\n...\n...").expect("a drawing"),
+            problems: vec![],
+            warnings: vec![],
+            picture: *OccupancyGrid::from_ascii(resolution_m, "...\n...\n...").expect("a drawing").frame(),
+        };
+        let cell_m = |resolution_m: f64| {
+            world(&map(resolution_m), RobotModel::husky()).grid.frame().resolution_m
+        };
+        assert_eq!(cell_m(0.5), 0.5, "as wide as the map says");
+        assert!((cell_m(1.0) - 1.0 / 3.0).abs() < 1e-12, "half as wide as a Husky: {}", cell_m(1.0));
     }
 
     #[test]

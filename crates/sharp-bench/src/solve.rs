@@ -1,11 +1,12 @@
 //! Solving one problem whole: library, abstraction, Algorithm 1, report, and the folder of the plan.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use sharp_options::OptionKind;
 use sharp_plan::{
-    AbstractionFile, AbstractionSettings, Answer, Method, Monitor, OptionLibrary, Phase, Plan, Sharp, hash,
-    map_hash, write_atomic,
+    AbstractionFile, AbstractionSettings, Answer, Method, Monitor, OptionLibrary, Phase, Plan, Sharp, Tour,
+    hash, map_hash, success, write_atomic,
 };
 use sharp_rbvd::CellMetric;
 use sharp_sim::SimulatorKind;
@@ -15,10 +16,15 @@ use crate::error::BenchError;
 use crate::json::to_json;
 use crate::named::{DETECTORS, NamedProblem, detector};
 use crate::pictures;
-use crate::reports::{MapReport, SolveReport};
+use crate::reports::{MapReport, SolveReport, Verified};
 use crate::stopwatch::TimedMonitor;
 use crate::times::{Reuse, SolveTimes};
 use sharp_drive::World;
+
+/// A plan that succeeds less often is run with recovery as well.
+const SHAKY: f64 = 0.98;
+/// In so many episodes.
+const RECOVERY_RUNS: u32 = 100;
 
 /// How the abstraction of a map is made.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,10 +92,28 @@ pub fn solve(
         .with_seed(Seed(*seed));
     let answer = sharp.solve(*query, monitor)?;
     let report = blank_report(problem, settings, &mut sharp, &file)?;
-    let (report, plan) = answered(report, answer);
+    let (mut report, plan) = answered(report, answer);
+    if let (Some(predicted), Some(plan)) = (&mut report.predicted, &plan) {
+        monitor.phase(Phase::Verify);
+        predicted.with_recovery = with_recovery(&Arc::new(plan.clone()).into(), settings);
+    }
     monitor.phase(Phase::Done);
     let report = SolveReport { time_s: monitor.times(), ..report };
     Ok(Solved { report, plan, sharp, file })
+}
+
+/// How often `tour` arrives where the robot may plan anew on the way, if it often has to; `None` for methods that stick to
+/// their plan or run none.
+pub(crate) fn with_recovery(tour: &Tour, settings: &SolveSettings) -> Option<Verified> {
+    let method = &settings.method;
+    let sticks = method.usable_success == 0.0 || method.verify_episodes == 0;
+    if sticks || tour.predicted.rate() >= SHAKY {
+        return None;
+    }
+    let first = &tour.plans[0];
+    let mut runs = tour.run_settings(RECOVERY_RUNS, first.seed.child("with recovery", 0));
+    runs.simulator = first.world.simulator(settings.simulator);
+    Some(success(&tour.run(&runs, &|| 0.0)).into())
 }
 
 /// A robot in `world` with the abstraction that `request` asks for: from the folder `cache` if that has it, else made

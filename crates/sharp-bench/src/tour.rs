@@ -11,7 +11,7 @@ use crate::json::to_json;
 use crate::named::NamedProblem;
 use crate::pictures;
 use crate::reports::{GoalReport, Predicted, SolveReport};
-use crate::solve::{SolveSettings, Solved, solve};
+use crate::solve::{SolveSettings, Solved, solve, with_recovery};
 use crate::stopwatch::TimedMonitor;
 use crate::times::Reuse;
 
@@ -37,8 +37,10 @@ pub fn solve_tour(
     library: Option<&Path>,
     monitor: &TimedMonitor<'_>,
 ) -> Result<SolvedTour, BenchError> {
-    for &goal in goals {
-        Query { goal, ..problem.query }.check(&problem.world)?;
+    for (index, &goal) in goals.iter().enumerate() {
+        let is_last = index + 1 == goals.len();
+        let check = Query { goal, ..problem.query }.check(&problem.world);
+        check.map_err(|error| if is_last { error } else { error.on_the_way() })?;
     }
     let (mut solved, mut start): (Vec<Solved>, Pose) = (Vec::new(), problem.query.start);
     for &goal in goals {
@@ -58,11 +60,16 @@ pub fn solve_tour(
         let simulator = problem.world.simulator(settings.simulator);
         Tour::verified(plans, &*simulator)
     });
+    let recovered = tour.as_ref().and_then(|tour| with_recovery(tour, settings));
     monitor.phase(Phase::Done);
     let Some(last) = solved.last() else {
         return Err(BenchError::Setting { setting: "goal", problem: "is missing".to_owned() });
     };
-    let report = SolveReport { time_s: monitor.times(), ..whole(&solved, last, goals, tour.as_ref()) };
+    let mut report = whole(&solved, last, goals, tour.as_ref());
+    report.time_s = monitor.times();
+    if let Some(predicted) = &mut report.predicted {
+        predicted.with_recovery = recovered;
+    }
     Ok(SolvedTour { report, tour, solved })
 }
 
@@ -94,6 +101,7 @@ fn whole(solved: &[Solved], last: &Solved, goals: &[Pose], tour: Option<&Tour>) 
             success: tour.predicted.rate(),
             lower95: tour.predicted.lower95(),
             sim_time_s: tour.predicted_time_s,
+            with_recovery: None,
         }),
         ..last.report.clone()
     }
@@ -108,6 +116,7 @@ impl SolvedTour {
     pub fn write(&mut self, folder: &Path, name: &Path) -> Result<(), BenchError> {
         let Self { report, tour, solved } = self;
         let Some(tour) = tour else { return Ok(()) };
+        Tour::remove(folder)?;
         for (index, one) in solved.iter_mut().enumerate() {
             one.write(&Tour::plan_folder(folder, index), &Tour::plan_folder(name, index))?;
         }

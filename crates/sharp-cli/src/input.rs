@@ -27,7 +27,7 @@ pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
         // Unknown cells of a mask mean nothing, whatever they mean in the map.
         let keepout = load(mask, &LoadOptions { unknown_free: false, ..options })?;
         if map.keep_out(&keepout.grid)? == 0 {
-            map.warnings.push(format!("--keepout {mask}: covers no cell of the map"));
+            map.warnings.push(format!("--keepout {mask}: covers no free cell of the map"));
         }
     }
     if args.downsample > 1 {
@@ -102,9 +102,19 @@ pub(crate) fn pose(flag: &str, text: &str, heading: HeadingRule) -> Result<Pose,
         _ => return Err(broken()),
     };
     let is_sane = |value: f64, limit: f64| value.is_finite() && value.abs() <= limit;
-    // Beyond 1000 rad an angle is a mistake in its unit, and its wrapped value has lost digits.
-    if !(is_sane(x, 1e9) && is_sane(y, 1e9) && is_sane(yaw, 1000.0)) {
+    let too_large = |what: &str, limit: &str| {
+        let message = format!("{flag} is {text:?}: {what} is beyond {limit}");
+        Err(Failure::new("POSE_INVALID", message))
+    };
+    if ![x, y, yaw].into_iter().all(f64::is_finite) {
         return Err(broken());
+    }
+    if !(is_sane(x, 1e9) && is_sane(y, 1e9)) {
+        return too_large("a coordinate", "1e9 m");
+    }
+    // Beyond 1000 rad an angle is a mistake in its unit, and its wrapped value has lost digits.
+    if !is_sane(yaw, 1000.0) {
+        return too_large("the yaw", "1000 rad");
     }
     if yaw.abs() > std::f64::consts::TAU + 1e-6 {
         eprintln!(

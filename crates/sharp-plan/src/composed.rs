@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use sharp_drive::{
-    Automaton, Command, Controller, Decision, Follower, Link, Motion, Observation, OptionPolicy, Policy,
+    Automaton, Command, Controller, Decision, Link, Motion, Observation, OptionPolicy, Policy, Prior,
     StandstillDetector,
 };
 use sharp_guide::{GuidedOption, LegId};
@@ -80,12 +80,18 @@ impl ComposedPolicy {
     /// look elsewhere, so there is a new way from where it is, if there is one.
     pub(crate) fn arriving(plan: Arc<Plan>, state: RobotState, recovery: bool) -> Self {
         let mut this = Self::new(plan, state, recovery);
-        if let Some((options, policies)) = this.replan() {
-            let observation = *this.automaton.observation();
-            this.automaton = Automaton::new(Link::chain(&options).into(), observation);
-            this.policies = policies;
-        }
+        this.begin_anew();
         this
+    }
+
+    /// The robot was carried to `state`: there is a new way from there. False if there is none.
+    pub(crate) fn relocate(&mut self, state: RobotState) -> bool {
+        let recoveries = self.events.recoveries + 1;
+        *self = Self {
+            events: Events { recoveries, ..self.events },
+            ..Self::new(Arc::clone(&self.plan), state, self.recovery)
+        };
+        self.begin_anew()
     }
 
     /// The option that is running.
@@ -157,6 +163,11 @@ impl ComposedPolicy {
             return false;
         }
         self.events.recoveries += 1;
+        self.begin_anew()
+    }
+
+    /// Drives on by a new plan from here; false if there is none.
+    fn begin_anew(&mut self) -> bool {
         let Some((options, policies)) = self.replan() else { return false };
         let observation = *self.automaton.observation();
         self.automaton = Automaton::new(Link::chain(&options).into(), observation);
@@ -165,7 +176,7 @@ impl ComposedPolicy {
         true
     }
 
-    /// α(x) again, and a plan with the policies at hand; options without one are followed slowly.
+    /// α(x) again, and a plan with the policies at hand; the prior drives options without one.
     fn replan(&self) -> Option<(Vec<Arc<GuidedOption>>, Vec<OptionPolicy>)> {
         let plan = &*self.plan;
         let query = Query { start: self.automaton.observation().state.pose, goal: plan.solution.query.goal };
@@ -184,9 +195,10 @@ impl ComposedPolicy {
         }
         let measured = |id: LegId| known.get(&id).filter(|_| is_kept(&id)).map(|step| step.learnt.estimate);
         let (_, options) = search.plan(&measured, &())?;
-        let cautious = || OptionPolicy::Follower(Follower::cautious(&plan.world.robot));
+        let caution = Prior::caution(plan.method.failure_cost_s);
+        let prior = || plan.world.prior().at(caution, &plan.world.robot, &plan.noise);
         let policy = |option: &Arc<GuidedOption>| {
-            known.get(&option.id).map_or_else(cautious, |step| step.learnt.policy.clone())
+            known.get(&option.id).map_or_else(prior, |step| step.learnt.policy.clone())
         };
         let policies = options.iter().map(policy).collect();
         Some((options, policies))

@@ -4,7 +4,7 @@
 //! of their content. Both are written to a temporary name in the same folder and then renamed.
 
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -81,10 +81,34 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 /// # Errors
 /// Returns an error that names the file if it cannot be written.
 pub fn write_ron<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
+    write_atomic(path, ron_text(path, value)?.as_bytes())
+}
+
+/// The same, where `owner` is a file that only holds together with what `path` held before: it is removed before
+/// anything else is written there.
+pub(crate) fn write_ron_under<T: Serialize>(path: &Path, value: &T, owner: &Path) -> Result<(), FileError> {
+    let text = ron_text(path, value)?;
+    if fs::read(path).is_ok_and(|before| before == text.as_bytes()) {
+        return Ok(());
+    }
+    remove(owner)?;
+    write_atomic(path, text.as_bytes())
+}
+
+/// Removes the file at `path` if there is one.
+pub(crate) fn remove(path: &Path) -> Result<(), FileError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(io(path)(error)),
+        _ => Ok(()),
+    }
+}
+
+/// `value` as RON under its checksum.
+fn ron_text<T: Serialize>(path: &Path, value: &T) -> Result<String, FileError> {
     let config = ron::ser::PrettyConfig::new().depth_limit(3).compact_arrays(true).new_line("\n");
     let text =
         ron::ser::to_string_pretty(value, config).map_err(|error| FileError::content(path, error))? + "\n";
-    write_atomic(path, format!("{PREFIX}{}\n{text}", hash(text.as_bytes())).as_bytes())
+    Ok(format!("{PREFIX}{}\n{text}", hash(text.as_bytes())))
 }
 
 /// Reads what [`write_ron`] wrote.

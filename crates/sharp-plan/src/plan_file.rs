@@ -20,9 +20,10 @@ use crate::odds::ComposedOdds;
 use crate::price::Pricer;
 use crate::query::Query;
 use crate::search::goal_of;
+use crate::tour::TOUR_FILE;
 use crate::verify::{PlannedOption, Solution};
 
-const PLAN_FILE: &str = "plan.ron";
+pub(crate) const PLAN_FILE: &str = "plan.ron";
 const ABSTRACTION_FILE: &str = "abstraction.ron";
 
 /// How an abstraction was made: what a file needs beside the states.
@@ -175,12 +176,14 @@ impl Plan {
         solution.steps.iter().enumerate().map(price_s).collect()
     }
 
-    /// Writes the plan into `folder`; the abstraction stands beside it as `abstraction`.
+    /// Writes the plan into `folder`, in place of any plan or tour there; the abstraction stands beside it as
+    /// `abstraction`.
     ///
     /// # Errors
     /// Returns an error that names the file that could not be written.
     pub fn save(&self, folder: &Path, abstraction: &AbstractionFile) -> Result<(), FileError> {
-        abstraction.save(&folder.join(ABSTRACTION_FILE))?;
+        let path = folder.join(PLAN_FILE);
+        files::write_ron_under(&folder.join(ABSTRACTION_FILE), abstraction, &path)?;
         let steps = self.solution.steps.iter().map(|step| step_file(step, folder));
         let file = PlanFile {
             format: FORMAT,
@@ -199,7 +202,9 @@ impl Plan {
             composed: self.solution.composed.clone(),
             steps: steps.collect::<Result<_, _>>()?,
         };
-        files::write_ron(&folder.join(PLAN_FILE), &file)
+        files::write_ron(&path, &file)?;
+        // Of an earlier plan to several goals.
+        files::remove(&folder.join(TOUR_FILE))
     }
 
     /// Reads the plan in `folder`, made in `grid`.
@@ -286,6 +291,7 @@ mod tests {
 
     use super::*;
     use crate::test_worlds::{self, HALL, SEALED};
+    use crate::tour::Tour;
 
     fn saved(kind: OptionKind) -> (Arc<Plan>, tempfile::TempDir) {
         let plan = test_worlds::plan(kind);
@@ -318,6 +324,28 @@ mod tests {
             }
             assert_eq!(read.solution.steps.len(), plan.solution.steps.len(), "{kind:?}");
         }
+    }
+
+    #[test]
+    fn a_folder_holds_the_last_plan_or_tour_and_nothing_of_those_before() {
+        let (plan, folder) = saved(OptionKind::Centroid);
+        let folder = folder.path();
+        let file = |kind: OptionKind| {
+            let (map, settings) = (map_hash(&plan.world.grid), OptionSettings::default());
+            AbstractionFile::new(map, "drawn".to_owned(), kind, settings, &*plan.abstraction.states)
+        };
+        let has = |name: &str| folder.join(name).exists();
+        let tour = Tour::from(Arc::clone(&plan));
+        tour.save(folder).unwrap();
+        assert_eq!([PLAN_FILE, TOUR_FILE].map(has), [false, true], "a tour takes the place of a plan");
+        plan.save(folder, &file(OptionKind::Centroid)).unwrap();
+        assert_eq!([PLAN_FILE, TOUR_FILE].map(has), [true, false], "and a plan that of a tour");
+        let owner = folder.join(PLAN_FILE);
+        let abstraction = folder.join(ABSTRACTION_FILE);
+        files::write_ron_under(&abstraction, &file(OptionKind::Centroid), &owner).unwrap();
+        assert!(has(PLAN_FILE), "it still holds with the abstraction as it is");
+        files::write_ron_under(&abstraction, &file(OptionKind::Interface), &owner).unwrap();
+        assert!(!has(PLAN_FILE), "no plan stands beside an abstraction that is not its own");
     }
 
     #[test]

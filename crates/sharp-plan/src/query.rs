@@ -18,6 +18,9 @@ pub struct Query {
     pub goal: Pose,
 }
 
+/// What messages call a goal on the way.
+const VIA: &str = "via";
+
 /// Why a robot cannot stand at one end of a query.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
@@ -25,7 +28,7 @@ pub enum QueryError {
     /// The pose lies outside the map.
     #[error("{end} {problem}")]
     Outside {
-        /// Which end: `start` or `goal`.
+        /// Which end: `start`, `goal` or `via`.
         end: &'static str,
         /// The pose, and where the map is.
         problem: String,
@@ -33,7 +36,7 @@ pub enum QueryError {
     /// The robot does not fit there.
     #[error("{end} {problem}")]
     Occupied {
-        /// Which end: `start` or `goal`.
+        /// Which end: `start`, `goal` or `via`.
         end: &'static str,
         /// The pose, what is wrong with it, and the nearest place with room.
         problem: String,
@@ -45,10 +48,10 @@ impl QueryError {
     #[must_use]
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Outside { end: "goal", .. } => "GOAL_OUTSIDE_MAP",
-            Self::Outside { .. } => "START_OUTSIDE_MAP",
-            Self::Occupied { end: "goal", .. } => "GOAL_OCCUPIED",
-            Self::Occupied { .. } => "START_OCCUPIED",
+            Self::Outside { end: "start", .. } => "START_OUTSIDE_MAP",
+            Self::Outside { .. } => "GOAL_OUTSIDE_MAP",
+            Self::Occupied { end: "start", .. } => "START_OCCUPIED",
+            Self::Occupied { .. } => "GOAL_OCCUPIED",
         }
     }
 }
@@ -66,6 +69,17 @@ impl Query {
         let goal: Vec<Pose> = (0..63).map(|step| Pose::at(self.goal.position, turned(step).into())).collect();
         check_end(world, "start", &start)?;
         check_end(world, "goal", &goal)
+    }
+}
+
+impl QueryError {
+    /// The same of a goal on the way, which messages call `via`.
+    #[must_use]
+    pub fn on_the_way(self) -> Self {
+        match self {
+            Self::Outside { problem, .. } => Self::Outside { end: VIA, problem },
+            Self::Occupied { problem, .. } => Self::Occupied { end: VIA, problem },
+        }
     }
 }
 

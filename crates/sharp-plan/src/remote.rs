@@ -15,6 +15,10 @@ const BACKED_OFF_WITHIN_M: f64 = 0.02;
 /// Backing off is given up after so many times the actions that it should take: something is in the way.
 const PATIENCE: f64 = 3.0;
 
+/// A robot is taken to have been carried, or wrong about its place before, if it is further from its last pose than
+/// twice what it can drive in an action, and this much more, metres.
+const CARRIED_M: f64 = 0.5;
+
 /// What a robot outside tells of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
@@ -71,6 +75,10 @@ pub struct RemoteDriver {
     policy: TourPolicy,
     state: RobotState,
     pending: Pending,
+    recovery: bool,
+    max_speed_mps: f64,
+    /// No way leads on from where the robot was carried.
+    is_stranded: bool,
 }
 
 /// The last answer, until its outcome is known.
@@ -116,7 +124,9 @@ impl RemoteDriver {
     /// If there is no plan.
     #[must_use]
     pub fn from_state(plans: Vec<Arc<Plan>>, state: RobotState, recovery: bool) -> Self {
-        Self { policy: TourPolicy::new(plans, state, recovery), state, pending: Pending::Nothing }
+        let max_speed_mps = plans.first().expect("a tour has a plan").world.robot.max_speed_mps;
+        let policy = TourPolicy::new(plans, state, recovery);
+        Self { policy, state, pending: Pending::Nothing, recovery, max_speed_mps, is_stranded: false }
     }
 
     /// How far the plan that runs has come: the number of its leg, from 0, and the share of its guide that is driven.
@@ -132,7 +142,12 @@ impl RemoteDriver {
 
     /// The same for a robot that is now in `state`.
     pub fn answer_in(&mut self, state: RobotState) -> Instruction {
-        self.state = state;
+        let before = std::mem::replace(&mut self.state, state);
+        let driven_max_m = 2.0 * self.max_speed_mps * ActionSettings::default().action_s + CARRIED_M;
+        let is_carried = before.pose.distance_m(&state.pose) > driven_max_m;
+        if self.recovery && (is_carried || self.is_stranded) {
+            return self.carried();
+        }
         match self.pending {
             Pending::Nothing => {}
             Pending::Command(command) => self.policy.observe(&Motion::commanded(command, state)),
@@ -148,6 +163,18 @@ impl RemoteDriver {
             }
         }
         self.decide()
+    }
+
+    /// What the robot has to do now that it is somewhere else than its last instruction leads.
+    fn carried(&mut self) -> Instruction {
+        self.is_stranded = !self.policy.relocate(RobotState::at_rest(self.state.pose));
+        if self.is_stranded {
+            self.pending = Pending::Nothing;
+            return self.instruction(None, 0.0, RemoteStatus::Lost);
+        }
+        let told = self.decide();
+        let is_new = told.status == RemoteStatus::Running;
+        if is_new { Instruction { status: RemoteStatus::Recovering, ..told } } else { told }
     }
 
     fn decide(&mut self) -> Instruction {
@@ -212,6 +239,19 @@ mod tests {
         let behind = answers[1].waypoint.expect("a place behind it");
         assert!((behind.position.x - 0.7).abs() < 1e-9, "so much is left: {behind:?}");
         assert!(answers.iter().all(|answer| answer.status == RemoteStatus::Running), "as planned");
+    }
+
+    #[test]
+    fn a_robot_that_is_carried_gets_a_way_from_there_at_once() {
+        let plan = plan(OptionKind::Interface);
+        let goal = plan.solution.query.goal.position;
+        let mut driver = RemoteDriver::new(vec![plan], &at(1.0, 2.2), true);
+        assert_eq!(driver.answer(&at(1.0, 2.2)).status, RemoteStatus::Running, "at the start");
+        let told = driver.answer(&at(5.0, 2.2));
+        assert_eq!(told.status, RemoteStatus::Recovering, "4 m in half a second");
+        let ahead = told.waypoint.expect("a way leads on");
+        assert!(ahead.distance_m(&Pose::new(5.0, 2.2, 0.0)) < 1.0, "from where it is: {told:?}");
+        assert_eq!(driver.answer(&at(goal.x, goal.y)).status, RemoteStatus::Reached, "set down at the goal");
     }
 
     #[test]

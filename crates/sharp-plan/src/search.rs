@@ -41,7 +41,8 @@ const EXPANSIONS: usize = 100_000;
 const EXPANSIONS_DEPARTING: usize = 5_000;
 /// Episodes in which each way out of a tight start is tried.
 const TRIAL_EPISODES: u32 = 200;
-/// A leg from the start whose guide succeeds less often than this, by its price, looks for a better way to begin.
+/// A leg from the start that succeeds less often than this, by its price and then when tried, looks for a better way to
+/// begin.
 const LEAVES_WELL: f64 = 0.98;
 
 /// The guided options of one problem and the searches among them.
@@ -69,6 +70,13 @@ pub struct Search<'a> {
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
     charges: BTreeMap<(LegId, LegId), f64>,
     seed: Seed,
+}
+
+/// A leg from the start, as it did in a few episodes.
+struct TriedLeg {
+    option: Arc<GuidedOption>,
+    cost_s: f64,
+    success: f64,
 }
 
 /// Why there is no search for a query: no abstract state at one of its ends.
@@ -324,34 +332,30 @@ impl<'a> Search<'a> {
         if !self.settings.departures || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
         }
-        // A price knows little of tight places; elsewhere only what seems better than to drive at once is tried.
-        let priced_s = |option: &GuidedOption| self.pricer.cost_s(&self.pricer.price(option, None), None);
-        let at_once_s = at_once.as_ref().map_or(f64::INFINITY, priced_s);
-        let others = self.departures().iter().filter_map(|way| self.departing(candidate, way));
-        let mut ways: Vec<GuidedOption> =
-            others.filter(|option| is_tight || priced_s(option) < at_once_s).collect();
-        if ways.is_empty() {
+        let mut tried: Vec<_> = at_once.clone().into_iter().map(|option| self.tried(option)).collect();
+        if !is_tight && tried.iter().any(|tried| tried.success >= LEAVES_WELL) {
             return at_once.map(Arc::new);
         }
-        ways.extend(at_once);
-        let options = ways.into_iter().map(Arc::new);
-        let tried = options.map(|option| (self.trial_cost_s(&option), option));
-        let (_, option) = tried.min_by(|a, b| a.0.total_cmp(&b.0)).expect("there is a way");
-        Ok(option)
+        let others = self.departures().iter().filter_map(|way| self.departing(candidate, way));
+        tried.extend(others.map(|option| self.tried(option)));
+        let cheapest = tried.into_iter().min_by(|a, b| a.cost_s.total_cmp(&b.cost_s));
+        cheapest.map_or_else(|| at_once.map(Arc::new), |tried| Ok(tried.option))
     }
 
-    /// What the leg `option` costs from the start, seconds: by a few episodes of the prior where there is a simulator, for
-    /// a price knows little of tight places.
-    fn trial_cost_s(&self, option: &Arc<GuidedOption>) -> f64 {
-        let price = self.pricer.price(option, None);
+    /// How the leg `option` does from the start: by a few episodes of the prior where there is a simulator, for a price
+    /// knows little of tight places.
+    fn tried(&self, option: GuidedOption) -> TriedLeg {
+        let option = Arc::new(option);
+        let price = self.pricer.price(&option, None);
         let measured = self.trials.map(|conditions| {
             let policy = self.pricer.policy();
             let states = InitialStates::exactly(RobotState::at_rest(self.query.start));
             let seed = self.seed.child(&format!("leave {}", option.id), 0);
             let trial = conditions.monte_carlo(self.world).with_episodes(TRIAL_EPISODES).with_seed(seed);
-            trial.estimate(&[Driver::new(option, &policy, None)], &states)
+            trial.estimate(&[Driver::new(&option, &policy, None)], &states)
         });
-        self.pricer.cost_s(&price, measured.as_ref())
+        let success = measured.map_or(price.parts().1, |measured| measured.count.rate());
+        TriedLeg { cost_s: self.pricer.cost_s(&price, measured.as_ref()), success, option }
     }
 
     /// From now on ways out of a tight start are tried under `conditions` before one is taken.

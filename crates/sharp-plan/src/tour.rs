@@ -11,23 +11,25 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sharp_drive::{
-    Controller, Decision, Episode, EpisodeEnd, EpisodeRules, Motion, SuccessCount, SuccessEstimate,
+    Command, Controller, Decision, Episode, EpisodeEnd, EpisodeRules, Motion, SuccessCount, SuccessEstimate,
     Supervisor, TIME_LIMIT_MIN_S,
 };
 use sharp_guide::GuidedOption;
-use sharp_sim::{RobotState, Simulator};
+use sharp_sim::{ActionSettings, RobotState, Simulator};
 use sharp_space::{OccupancyGrid, Pose, Seed};
 
 use crate::composed::{ComposedPolicy, Events};
 use crate::execute::{Execution, RunSettings, TIME_LIMIT_FACTOR, rules};
 use crate::files::{self, FileError};
-use crate::plan_file::Plan;
+use crate::plan_file::{PLAN_FILE, Plan};
 
-const TOUR_FILE: &str = "tour.ron";
+pub(crate) const TOUR_FILE: &str = "tour.ron";
 /// A robot drives on to the end of the guide after it has reached a goal that is not the last, until it is this near, metres,
 /// or gets no nearer, or for so many actions: the next plan begins there.
 const END_WITHIN_M: f64 = 0.1;
 const ACTIONS_TO_END_MAX: u32 = 8;
+/// Its speed there, metres per second, at most.
+const APPROACH_MPS: f64 = 0.3;
 /// Where it is then nearer to the start of the next plan than this, metres and radians, that plan holds as it is.
 const START_WITHIN: (f64, f64) = (0.25, 0.4);
 /// Most runs that a prediction is counted on: each plans anew at every goal, which takes far longer than driving.
@@ -137,7 +139,21 @@ impl Tour {
         folder.join(format!("goal-{}", index + 1))
     }
 
-    /// Writes what is not in the plans' own folders into `folder`.
+    /// Returns true if `folder` holds a plan or a tour.
+    #[must_use]
+    pub fn is_in(folder: &Path) -> bool {
+        [TOUR_FILE, PLAN_FILE].iter().any(|file| folder.join(file).exists())
+    }
+
+    /// Removes the tour in `folder`, if there is one, so that the plans in its folders may be replaced.
+    ///
+    /// # Errors
+    /// Returns an error that names the file that could not be removed.
+    pub fn remove(folder: &Path) -> Result<(), FileError> {
+        files::remove(&folder.join(TOUR_FILE))
+    }
+
+    /// Writes what is not in the plans' own folders into `folder`, in place of any plan there.
     ///
     /// # Errors
     /// Returns an error that names the file that could not be written.
@@ -145,7 +161,8 @@ impl Tour {
         let Self { plans, predicted, predicted_time_s } = self;
         let (predicted, predicted_time_s) = (*predicted, *predicted_time_s);
         let file = TourFile { plans: plans.len(), predicted, predicted_time_s };
-        files::write_ron(&folder.join(TOUR_FILE), &file)
+        files::write_ron(&folder.join(TOUR_FILE), &file)?;
+        files::remove(&folder.join(PLAN_FILE))
     }
 
     /// Reads the plan or the tour in `folder`, made in `grid`.
@@ -226,10 +243,25 @@ impl TourPolicy {
         off_m > END_WITHIN_M && off_m < least_m && actions < ACTIONS_TO_END_MAX
     }
 
+    /// Slowly to the end of the guide, so that the robot stands there as the next plan supposes.
+    fn approach(&self) -> Command {
+        let pose = &self.current.observation().state.pose;
+        let end = self.current.option().guide.end().position;
+        let command = Command::of(pose, end, 0.0);
+        let speed_mps = (command.reach_m / (2.0 * ActionSettings::default().action_s)).min(APPROACH_MPS);
+        Command { speed_mps, ..command }
+    }
+
     /// How far the present plan is: the number of its leg, from 0, and the share of its guide that is driven.
     #[must_use]
     pub fn progress(&self) -> (usize, f64) {
         self.current.progress()
+    }
+
+    /// The robot was carried to `state`: it drives to its present goal from there. False if no way leads there.
+    pub(crate) fn relocate(&mut self, state: RobotState) -> bool {
+        self.since_reached = (0, f64::INFINITY);
+        self.current.relocate(state)
     }
 
     /// Goals that come after the present one.
@@ -274,7 +306,7 @@ impl Controller for TourPolicy {
             }
             let Some(next) = self.to_come.last().cloned() else { return decision };
             if self.is_nearing_the_end() {
-                return self.current.drive();
+                return Decision::Drive(self.approach());
             }
             self.to_come.pop();
             self.before = self.events();

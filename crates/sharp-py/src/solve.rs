@@ -1,15 +1,18 @@
 //! Solving a problem.
 
+use std::fmt::Display;
+use std::fs;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use pyo3::prelude::*;
 use sharp_bench::{
-    AbstractionRequest, NamedProblem, SolveSettings, Solved, Stopwatch, TimedMonitor, named,
-    solve as solve_problem, to_json,
+    AbstractionRequest, NamedProblem, SolveSettings, Solved, SpeedRule, Stopwatch, TimedMonitor, named,
+    solve as solve_problem, speed_limits, to_json,
 };
-use sharp_drive::World;
+use sharp_drive::{Prior, World};
+use sharp_maps::{LoadOptions, load_values};
 use sharp_options::OptionKind;
 use sharp_plan::{Method, Query};
 use sharp_rbvd::CellMetric;
@@ -32,6 +35,10 @@ pub(crate) struct Settings {
     seed: u64,
     time_limit: Option<f64>,
     failure_cost: Option<f64>,
+    goal_heading_tolerance: Option<f64>,
+    speed_mask: Option<PathBuf>,
+    speed_rule: (f64, f64, bool),
+    prior: Option<PathBuf>,
 }
 
 /// Solves a problem; returns the report as JSON, and the plan if there is one.
@@ -47,7 +54,7 @@ pub(crate) fn solve(
 ) -> PyResult<(String, Option<PyPlan>)> {
     let problem = NamedProblem {
         map: map.file.name.clone(),
-        world: World::new(map.file.grid.clone(), robot.model.clone()),
+        world: settings.world(map, robot)?,
         query: Query { start: pose(start), goal: pose(goal) },
         noise: settings.noise.clone(),
         noise_model: named::noise(&settings.noise).map_err(Raised::from)?,
@@ -78,6 +85,27 @@ fn limit(seconds: f64) -> Result<Duration, Raised> {
 }
 
 impl Settings {
+    /// The robot in its map, with the speed limits and the prior that are asked for.
+    fn world(&self, map: &PyMap, robot: &PyRobot) -> Result<World, Raised> {
+        let mut world = named::world(&map.file, robot.model.clone());
+        if let Some(file) = &self.speed_mask {
+            let (base, multiplier, is_absolute) = self.speed_rule;
+            let mask = load_values(file, &LoadOptions::default())?;
+            let rule = SpeedRule { base, multiplier, is_absolute };
+            let limits = speed_limits(&mask, rule, robot.model.max_speed_mps).map_err(|error| {
+                Raised::new("MAP_FIELD", format!("speed_mask {}: {error}", file.display()))
+            })?;
+            world = world.with_speed_limits(limits);
+        }
+        if let Some(file) = &self.prior {
+            let broken =
+                |error: &dyn Display| Raised::new("FILE_INVALID", format!("{}: {error}", file.display()));
+            let bytes = fs::read(file).map_err(|error| broken(&error))?;
+            world = world.with_prior(Prior::from_bytes(&bytes).map_err(|error| broken(&error))?);
+        }
+        Ok(world)
+    }
+
     fn wanted(&self) -> Result<SolveSettings, Raised> {
         let options = match self.options.as_str() {
             "centroid" => OptionKind::Centroid,
@@ -100,6 +128,14 @@ impl Settings {
                 ));
             }
             method.failure_cost_s = seconds;
+        }
+        if let Some(tolerance_rad) = self.goal_heading_tolerance {
+            if !(0.05..=std::f64::consts::PI).contains(&tolerance_rad) {
+                let expected = "expected radians from 0.05 to 3.14";
+                let message = format!("goal_heading_tolerance is {tolerance_rad}, {expected}");
+                return Err(Raised::new("USAGE", message));
+            }
+            method.search.goal_heading_tolerance_rad = Some(tolerance_rad);
         }
         Ok(SolveSettings {
             abstraction: AbstractionRequest {

@@ -77,6 +77,27 @@ try:
 except KeyError:
     pass
 
+# A heading at the goal, a slow zone in the second room, and what is wrong with either.
+headed = {**across, "goal": (10.0, 3.0, 1.57)}
+turned = sharp.solve(rooms, limo, **headed, goal_heading_tolerance=0.4)
+ends = [drive.samples[-1][3] for drive in turned.run(episodes=20).drives]
+assert np.mean([abs(np.remainder(yaw - 1.57 + np.pi, 2 * np.pi) - np.pi) < 0.4 for yaw in ends]) > 0.8, ends
+raises("USAGE", lambda: sharp.solve(rooms, limo, **across, goal_heading_tolerance=0.4))
+raises("USAGE", lambda: sharp.solve(rooms, limo, **headed, goal_heading_tolerance=9))
+with tempfile.TemporaryDirectory() as folder:
+    zone = np.zeros((62, 122), np.uint8)
+    zone[:, 62:] = 70
+    (pathlib.Path(folder) / "zone.pgm").write_bytes(b"P5\n122 62\n255\n" + (255 - zone).tobytes())
+    mask = pathlib.Path(folder) / "zone.yaml"
+    mask.write_text(
+        "image: zone.pgm\nmode: raw\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 1\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    slow = sharp.solve(rooms, limo, **across, speed_mask=mask)
+    assert slow.predicted["sim_time_s"] > 1.3 * plan.predicted["sim_time_s"], (slow.predicted, plan.predicted)
+    raises("MAP_FIELD", lambda: sharp.solve(rooms, limo, **across, speed_mask=mask, speed_base=50))
+    raises("FILE_INVALID", lambda: sharp.solve(rooms, limo, **across, prior=mask))
+
 # Where there is no way, the exception says why.
 closed = cells.copy()
 closed[:, 60:62] = 100

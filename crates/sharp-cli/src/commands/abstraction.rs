@@ -35,7 +35,7 @@ struct AbstractReport {
 pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failure> {
     let stopwatch = Stopwatch::start("load");
     let map = input::map(&args.map)?;
-    let world = World::new(map.grid.clone(), named::robot(&args.abstraction.robot)?);
+    let world = named::world(&map, named::robot(&args.abstraction.robot)?);
     let spinner = SolveMonitor::new(spinner("building the abstraction"), None);
     let monitor = TimedMonitor::new(stopwatch, None, &spinner);
     let (sharp, file) = prepare(world, &args.abstraction.request(), None, &monitor)?;
@@ -50,9 +50,9 @@ pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failur
     file.save(&args.out.join("abstraction.ron"))?;
     if let Some(criticality) = sharp.detection().and_then(|found| found.criticality.as_deref()) {
         let regions = pictures::regions_of(&file.rbvd);
-        pictures::write(&args.out, "regions", &pictures::regions(&map.grid, criticality, &regions))?;
+        pictures::write(&args.out, "regions", &pictures::regions(&world.grid, criticality, &regions))?;
     }
-    pictures::write(&args.out, "abstraction", &pictures::abstraction(&map.grid, &abstraction))?;
+    pictures::write(&args.out, "abstraction", &pictures::abstraction(&world.grid, &abstraction))?;
     write_atomic(&args.out.join("route.geojson"), graph.to_geojson().as_bytes())?;
 
     let rbvd = &file.rbvd;

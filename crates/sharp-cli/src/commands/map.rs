@@ -1,8 +1,7 @@
 //! `sharp map info|check|save`: what a map file says, whether a robot has room in it, and the same as a ROS map.
 
 use serde::Serialize;
-use sharp_bench::MapReport;
-use sharp_drive::World;
+use sharp_bench::{MapReport, named};
 use sharp_plan::AbstractionSettings;
 use sharp_rbvd::Rbvd;
 use sharp_space::Occupancy;
@@ -108,7 +107,7 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
         }
         Map::Check { map, robot } => {
             let map = input::map(map)?;
-            let world = World::new(map.grid, sharp_bench::named::robot(robot)?);
+            let world = named::world(&map, named::robot(robot)?);
             let rbvd = AbstractionSettings::new(&world).diagram(&world, &[]).ok();
             let check = Check {
                 schema: "sharp.map.check/1",

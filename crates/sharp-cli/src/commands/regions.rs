@@ -45,7 +45,7 @@ pub(crate) fn label_robot(robot: &RobotModel) -> LabelRobot {
 
 fn predict(args: &Abstract, json: bool) -> Result<Exit, Failure> {
     let map = input::map(&args.map)?;
-    let world = World::new(map.grid, named::robot(&args.abstraction.robot)?);
+    let world = named::world(&map, named::robot(&args.abstraction.robot)?);
     let detector = named::detector(&world, &args.abstraction.regions)?;
     let found = detector.detect(&world.grid, &world.robot.footprint);
     if let Some(criticality) = &found.criticality {

@@ -85,6 +85,9 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     if is_time_up && report.predicted.is_some() && !is_interrupted() {
         eprintln!("warning: time was up before the search was done, this is the best plan so far");
     }
+    if let Some(folder) = args.out.as_deref().filter(|folder| report.plan_dir.is_none() && Tour::is_in(folder)) {
+        eprintln!("warning: {} still holds the plan of an earlier solve", folder.display());
+    }
     if json {
         say!("{}", to_json(&report));
     } else {
@@ -228,6 +231,13 @@ fn print_report(report: &SolveReport) {
             report.reuse.reused,
             report.reuse.uses
         );
+        if let Some(recovered) = &predicted.with_recovery {
+            say!(
+                "where the robot may plan anew on the way, {} of {} runs arrive",
+                recovered.successes,
+                recovered.episodes
+            );
+        }
     }
     say!("library: {}", report.library);
     let time = &report.time_s;

@@ -8,24 +8,27 @@ use super::load::MapFile;
 /// How far a mask's cell may reach into a map's cell without touching it, in cells: frames are not exact.
 const TOUCH: f64 = 1e-6;
 
+/// Cells of a map that is drawn finer, at most: 4000 x 4000.
+const REFINED_MAX_CELLS: usize = 16_000_000;
+
 impl MapFile {
     /// Occupies every cell that an occupied cell of `mask` overlaps, as a keep-out mask of Nav2 does, and returns how many
-    /// cells that are. The mask has its own frame and resolution. Its free and unknown cells change nothing.
+    /// cells were not occupied before. The mask has its own frame and resolution. Its free and unknown cells change nothing.
     ///
     /// # Errors
     /// If the result is no grid; a map that was read always gives one.
     pub fn keep_out(&mut self, mask: &OccupancyGrid) -> Result<usize, MapError> {
         let frame = *self.grid.frame();
         let mut cells = self.grid.cells().to_vec();
-        let mut kept_out = vec![false; frame.len()];
+        let mut kept_out = 0;
         for (index, _) in mask.cells().iter().enumerate().filter(|(_, cell)| **cell == Occupancy::Occupied) {
             for cell in overlapped(&frame, mask.frame(), mask.frame().cell(index)) {
-                kept_out[frame.index(cell)] = true;
-                cells[frame.index(cell)] = Occupancy::Occupied;
+                let before = std::mem::replace(&mut cells[frame.index(cell)], Occupancy::Occupied);
+                kept_out += usize::from(before != Occupancy::Occupied);
             }
         }
         self.set_grid(frame, cells)?;
-        Ok(kept_out.into_iter().filter(|&is_kept_out| is_kept_out).count())
+        Ok(kept_out)
     }
 
     /// Makes cells of `factor` x `factor` cells. A coarse cell is occupied if any of its cells is, or if it reaches beyond
@@ -61,6 +64,31 @@ impl MapFile {
         };
         let cells = (0..frame.len()).map(|index| of(index / frame.width, index % frame.width)).collect();
         self.set_grid(frame, cells)
+    }
+
+    /// The grid, its cells divided so that none is wider than `most_m` metres, as far as 16 million cells allow:
+    /// the same map drawn finer.
+    #[must_use]
+    pub fn grid_with_cells(&self, most_m: f64) -> OccupancyGrid {
+        let coarse = *self.grid.frame();
+        let wanted = (coarse.resolution_m / most_m - 1e-9).ceil().max(1.0);
+        let allowed = (REFINED_MAX_CELLS as f64 / coarse.len() as f64).sqrt().max(1.0);
+        let factor = wanted.min(allowed).floor() as usize;
+        if factor == 1 {
+            return self.grid.clone();
+        }
+        let frame = GridFrame {
+            resolution_m: coarse.resolution_m / factor as f64,
+            width: coarse.width * factor,
+            height: coarse.height * factor,
+            ..coarse
+        };
+        let of = |index: usize| {
+            let Cell { col, row } = frame.cell(index);
+            self.grid.get(Cell::new(col / factor, row / factor))
+        };
+        let cells = (0..frame.len()).map(of).collect();
+        OccupancyGrid::new(frame, cells).expect("a grid stays one when its cells are divided")
     }
 
     fn set_grid(&mut self, frame: GridFrame, cells: Vec<Occupancy>) -> Result<(), MapError> {
@@ -132,5 +160,19 @@ mod tests {
         let mut unknown = map("..?.\n....");
         unknown.downsample(2).expect("a grid");
         assert_eq!(unknown.grid.to_string(), ".?\n");
+    }
+
+    #[test]
+    fn a_map_drawn_finer_has_the_same_walls_in_the_same_places() {
+        let coarse = map("#..\n.?#");
+        let fine = coarse.grid_with_cells(0.2);
+        let frame = fine.frame();
+        assert_eq!((frame.width, frame.height), (9, 6), "cells of 0.5 m in three");
+        for index in 0..frame.len() {
+            let cell = frame.cell(index);
+            let before = coarse.grid.frame().cell_at(frame.center(cell)).expect("inside");
+            assert_eq!(fine.get(cell), coarse.grid.get(before), "{cell:?}");
+        }
+        assert_eq!(coarse.grid_with_cells(0.5), coarse.grid, "fine enough as it is");
     }
 }

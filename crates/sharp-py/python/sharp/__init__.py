@@ -390,6 +390,12 @@ def solve(
     seed: int = 1,
     time_limit: float | None = None,
     failure_cost: float | None = None,
+    goal_heading_tolerance: float | None = None,
+    speed_mask: PathLike | None = None,
+    speed_base: float = 100.0,
+    speed_multiplier: float = -1.0,
+    speed_absolute: bool = False,
+    prior: PathLike | None = None,
     progress: Callable[[str, str], Any] | None = None,
 ) -> Plan:
     """Solves a problem: from `start` (x, y, yaw) to `goal` (x, y), or `problem` 1 to 5 of a named map.
@@ -398,6 +404,10 @@ def solve(
     "biased", one of them with a factor ("nominal*2") or a file. `library` is a folder that keeps what is learnt. `progress` is
     called with a phase and a message, from any thread; what it raises ends the solve. `time_limit` is in seconds.
     Equal seeds give equal plans, from equal libraries and without a time limit.
+
+    With `goal_heading_tolerance`, radians, the robot has to arrive in the yaw of `goal`, at most so far off. `speed_mask` is a
+    ROS map whose values limit the speed as the speed filter of Nav2 does: base + multiplier x value, in percent of the top
+    speed, or in metres per second if `speed_absolute`. `prior` is a file of `sharp prior train`.
     """
     if problem is not None:
         if start is not None or goal is not None:
@@ -417,7 +427,13 @@ def solve(
         seed=int(seed),
         time_limit=None if time_limit is None else float(time_limit),
         failure_cost=None if failure_cost is None else float(failure_cost),
+        goal_heading_tolerance=None if goal_heading_tolerance is None else float(goal_heading_tolerance),
+        speed_mask=None if speed_mask is None else os.fspath(speed_mask),
+        speed_rule=(float(speed_base), float(speed_multiplier), bool(speed_absolute)),
+        prior=None if prior is None else os.fspath(prior),
     )
+    if goal_heading_tolerance is not None and len(goal) != 3:
+        raise SharpError("USAGE", "goal_heading_tolerance needs a goal with a yaw: (x, y, yaw)")
     robot = robot if isinstance(robot, Robot) else Robot(robot)
     ends = (_pose("start", start, True), _pose("goal", goal, False))
     text, plan = _core.solve(map._core, robot._core, *ends, settings, progress)
