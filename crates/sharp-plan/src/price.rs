@@ -56,10 +56,11 @@ impl<'a> Pricer<'a> {
         Self { world, noise: noise.clone(), settings, failure_cost_s, profile }
     }
 
-    /// The policy whose drives the model prices: the prior.
-    pub(crate) fn policy(&self) -> OptionPolicy {
-        let caution = Prior::caution(self.failure_cost_s);
-        self.world.prior().at(caution, &self.world.robot, &self.noise)
+    /// The policies at hand for a leg: the prior, whose drives the model prices, and the follower that stands in for it.
+    pub(crate) fn policies(&self) -> [OptionPolicy; 2] {
+        let (robot, caution) = (&self.world.robot, Prior::caution(self.failure_cost_s));
+        let follower = ProfiledFollower::tuned(robot, &self.noise);
+        [self.world.prior().at(caution, robot, &self.noise), OptionPolicy::Profiled(follower)]
     }
 
     /// The price of `option`, and the `next` guide after it where that is known.

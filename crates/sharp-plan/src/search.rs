@@ -342,20 +342,28 @@ impl<'a> Search<'a> {
         cheapest.map_or_else(|| at_once.map(Arc::new), |tried| Ok(tried.option))
     }
 
-    /// How the leg `option` does from the start: by a few episodes of the prior where there is a simulator, for a price
-    /// knows little of tight places.
+    /// How the leg `option` does from the start: by a few episodes where there is a simulator, for a price knows little of
+    /// tight places. The prior drives, and where it fails too often the follower as well.
     fn tried(&self, option: GuidedOption) -> TriedLeg {
         let option = Arc::new(option);
         let price = self.pricer.price(&option, None);
-        let measured = self.trials.map(|conditions| {
-            let policy = self.pricer.policy();
-            let states = InitialStates::exactly(RobotState::at_rest(self.query.start));
-            let seed = self.seed.child(&format!("leave {}", option.id), 0);
-            let trial = conditions.monte_carlo(self.world).with_episodes(TRIAL_EPISODES).with_seed(seed);
-            trial.estimate(&[Driver::new(&option, &policy, None)], &states)
-        });
-        let success = measured.map_or(price.parts().1, |measured| measured.count.rate());
-        TriedLeg { cost_s: self.pricer.cost_s(&price, measured.as_ref()), success, option }
+        let cost_s = |measured: Option<&SuccessEstimate>| self.pricer.cost_s(&price, measured);
+        let Some(conditions) = self.trials else {
+            return TriedLeg { cost_s: cost_s(None), success: price.parts().1, option };
+        };
+        let states = InitialStates::exactly(RobotState::at_rest(self.query.start));
+        let seed = self.seed.child(&format!("leave {}", option.id), 0);
+        let trial = conditions.monte_carlo(self.world).with_episodes(TRIAL_EPISODES).with_seed(seed);
+        let estimate = |policy| trial.estimate(&[Driver::new(&option, policy, None)], &states);
+        let [prior, follower] = &self.pricer.policies();
+        let mut best = estimate(prior);
+        if best.count.rate() < LEAVES_WELL {
+            let other = estimate(follower);
+            if cost_s(Some(&other)) < cost_s(Some(&best)) {
+                best = other;
+            }
+        }
+        TriedLeg { cost_s: cost_s(Some(&best)), success: best.count.rate(), option }
     }
 
     /// From now on ways out of a tight start are tried under `conditions` before one is taken.
