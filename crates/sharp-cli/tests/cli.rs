@@ -69,7 +69,7 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
         fs::write(folder.path().join(file), text).unwrap();
     }
     fs::write(folder.path().join("bytes.ron"), b"\xff\xfe").unwrap();
-    let cases: [(&[&str], &str, &str); 21] = [
+    let cases: [(&[&str], &str, &str); 26] = [
         (&["solve", "rooms.yaml", "--start", "2,3,0", "--goal", "6.05,1,0"], "GOAL_OCCUPIED", "goal"),
         (&["solve", "rooms.yaml", "--start", "-2,3,0", "--goal", "10,3,0"], "START_OUTSIDE_MAP", "start"),
         (&["solve", "rooms.yaml", "--start", "2,NaN,0", "--goal", "10,3,0"], "POSE_INVALID", "--start"),
@@ -84,7 +84,16 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
         (&["solve", "a", "--problem", "9"], "PROBLEM_UNKNOWN", "1..5"),
         (&["solve", "a", "--problem", "1", "--failure-cost", "NaN"], "USAGE", "--failure-cost is NaN"),
         (&["map", "check", "rooms.yaml", "--robot", "robot.ron"], "ROBOT_INVALID", "robot.ron"),
-        (&["run", "missing"], "", "missing"),
+        (&["solve", "rooms.yaml", "--start", "2,3,1e6", "--goal", "10,3"], "POSE_INVALID", "the yaw is beyond"),
+        (
+            &["solve", "rooms.yaml", "--start", "2,3,0", "--via", "6.05,1", "--goal", "10,3"],
+            "GOAL_OCCUPIED",
+            "via (6.05",
+        ),
+        (&["run", "missing"], "FILE_INVALID", "missing is no folder"),
+        (&["run", "."], "FILE_INVALID", "holds no plan"),
+        (&["serve", "missing"], "FILE_INVALID", "missing is no folder"),
+        (&["serve", "rooms.yaml"], "USAGE", "--library"),
         (&["run", "missing", "--simulator", "bullet"], "USAGE", "must be rapier2d"),
         (&["map", "check", "a", "--robot", "tank"], "FILE_UNREADABLE", "car or a robot file"),
         (&["map", "check", "a", "--robot", "."], "FILE_UNREADABLE", "is a folder"),
@@ -377,6 +386,21 @@ fn serve_answers_every_line() {
     assert!(replies[0]["waypoint"][0].as_f64() > Some(2.0), "ahead: {}", replies[0]);
     assert_eq!(replies[1]["schema"], "sharp.error/1");
     assert_eq!(replies[2]["status"], "running");
+    assert_eq!(replies[3]["status"], "reached", "carried to the goal: {}", replies[3]);
+}
+
+#[test]
+fn a_solve_without_a_plan_leaves_an_earlier_one_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    assert!(solve_rooms(folder.path(), &["--library", "none", "--out", "plan"]).status.success(), "solved");
+    let before = files_in(&folder.path().join("plan"));
+    write_rooms(folder.path(), false);
+    let refused = solve_rooms(folder.path(), &["--library", "none", "--out", "plan"]);
+    assert_eq!(refused.status.code(), Some(1), "the door is closed: {refused:?}");
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(said.contains("warning: plan still holds the plan of an earlier solve"), "{said}");
+    assert_eq!(files_in(&folder.path().join("plan")), before, "nothing is lost");
 }
 
 #[test]

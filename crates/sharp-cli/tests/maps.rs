@@ -134,6 +134,21 @@ fn places_are_told_by_pixel_and_by_scenario() {
 }
 
 #[test]
+fn cells_of_a_metre_do_not_hide_a_door_of_one_cell() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let row = |row: usize| if row == 2 { ".........\n" } else { "....@....\n" };
+    let map: String = (0..5).map(row).collect();
+    fs::write(folder.path().join("rooms.map"), format!("type octile\nheight 5\nwidth 9\nmap\n{map}"))
+        .expect("a file");
+    let ends = ["--start", "1.5,3.5,0", "--goal", "7.5,1.5"];
+    let args = [&["solve", "rooms.map", "--robot", "turtlebot3", "--out", "p", "--json"], &ends[..], &QUICK];
+    let solved = json(&sharp(folder.path(), &args.concat()));
+    assert_eq!(solved["status"], "solved", "{solved}");
+    let run = json(&sharp(folder.path(), &["run", "p", "--episodes", "10", "--json"]));
+    assert!(run["successes"].as_u64().is_some_and(|count| count >= 9), "{run}");
+}
+
+#[test]
 fn goals_in_a_row_are_solved_run_and_served_as_one() {
     let folder = tempfile::tempdir().expect("a folder");
     write_hall(folder.path(), "hall", 0..0);
@@ -148,6 +163,11 @@ fn goals_in_a_row_are_solved_run_and_served_as_one() {
     let run = json(&sharp(folder.path(), &["run", "p", "--episodes", "20", "--json"]));
     assert!(run["successes"].as_u64().is_some_and(|count| count >= 17), "{run}");
     assert!(run["mean_path_m"].as_f64().is_some_and(|m| m > 14.0), "both goals: {run}");
+    // A single goal in the same folder takes the place of the tour.
+    let single = ["solve", "hall.yaml", "--start", "1,4,0", "--goal", "9,4", "--out", "p", "--json"];
+    assert!(sharp(folder.path(), &[&single[..], &QUICK].concat()).status.success(), "solved");
+    let run = json(&sharp(folder.path(), &["run", "p", "--episodes", "5", "--json"]));
+    assert!(run["mean_path_m"].as_f64().is_some_and(|m| m < 12.0), "one goal: {run}");
     let wanted = [&args[..9], &["q", "--min-success", "1", "--noise", "harsh", "--json"], &QUICK].concat();
     let output = sharp(folder.path(), &wanted);
     if json(&output)["predicted"]["success"].as_f64().is_some_and(|success| success < 1.0) {

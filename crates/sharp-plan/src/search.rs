@@ -59,7 +59,9 @@ pub struct Search<'a> {
     pricer: Pricer<'a>,
     /// What guided options cost before they are measured.
     prices: BTreeMap<LegId, Price>,
-    /// How the robot can leave its start, where that is a tight place; found when it is first asked for.
+    /// Whether the start is a tight place; found when it is first asked for, as is the next.
+    is_tight: OnceLock<bool>,
+    /// How the robot can leave its start.
     departures: OnceLock<Vec<(Departure, Vec<Pose>)>>,
     /// Under what they are tried; by their prices alone without.
     trials: Option<&'a Conditions>,
@@ -124,6 +126,7 @@ impl<'a> Search<'a> {
             guided: BTreeMap::new(),
             pricer: Pricer::new(world, noise, method.search, method.failure_cost_s),
             prices: BTreeMap::new(),
+            is_tight: OnceLock::new(),
             departures: OnceLock::new(),
             trials: None,
             offers_direct: false,
@@ -327,7 +330,8 @@ impl<'a> Search<'a> {
             return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
         }
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
-        let is_tight = is_tight(&self.world.guide_robot(), self.query.start);
+        let is_tight =
+            *self.is_tight.get_or_init(|| is_tight(&self.world.guide_robot(), self.query.start));
         let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
         if !self.settings.departures || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);

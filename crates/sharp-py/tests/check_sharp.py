@@ -87,10 +87,10 @@ raises("USAGE", lambda: sharp.solve(rooms, limo, **headed, goal_heading_toleranc
 with tempfile.TemporaryDirectory() as folder:
     zone = np.zeros((62, 122), np.uint8)
     zone[:, 62:] = 70
-    (pathlib.Path(folder) / "zone.pgm").write_bytes(b"P5\n122 62\n255\n" + (255 - zone).tobytes())
+    (pathlib.Path(folder) / "zone.pgm").write_bytes(b"P5\n122 62\n255\n" + zone.tobytes())
     mask = pathlib.Path(folder) / "zone.yaml"
     mask.write_text(
-        "image: zone.pgm\nmode: raw\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 1\n"
+        "image: zone.pgm\nmode: raw\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n"
         "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
     )
     slow = sharp.solve(rooms, limo, **across, speed_mask=mask)

@@ -3,7 +3,7 @@
 //! The actions of the paper's policies are points that the robot's own controller drives to. The controller
 //! knows the robot's limits and its mean yaw gain, but not the noise.
 
-use sharp_space::{Heading, Point, Pose, Vector, trig};
+use sharp_space::{Point, Pose, Vector, trig};
 
 use crate::robot::{Drive, RobotModel};
 use crate::state::{RobotState, WheelCommand};
@@ -69,27 +69,7 @@ impl WaypointController {
         self.towards(self.target(state, aim), aim.speed_mps)
     }
 
-    /// The command for the next control period of reversing at `speed_mps` straight along `heading`, which the robot holds
-    /// against drift as it does on its way to a waypoint.
-    #[must_use]
-    pub fn reverse(&self, state: &RobotState, heading: Heading, speed_mps: f64) -> WheelCommand {
-        let yaw_rate_radps = BEARING_GAIN_PS * state.pose.heading.turn_to(heading);
-        match self.drive {
-            Drive::Differential { .. } => {
-                let limit = self.max_yaw_rate_radps;
-                let yaw_rate_radps = (yaw_rate_radps / self.yaw_gain).clamp(-limit, limit);
-                WheelCommand::Twist { speed_mps: -speed_mps, yaw_rate_radps }
-            }
-            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => {
-                // In reverse the wheels point the other way for the same turn.
-                let steer_rad = -trig::atan(yaw_rate_radps * wheelbase_m / speed_mps);
-                let steer_rad = steer_rad.clamp(-max_steer_rad, max_steer_rad);
-                WheelCommand::Steer { speed_mps: -speed_mps, steer_rad }
-            }
-        }
-    }
-
-    /// The same as [`command`](Self::command), and what a waypoint turned by one radian would change: the yaw rate, rad/s, or the steering
+    /// The same, and what a waypoint turned by one radian would change: the yaw rate, rad/s, or the steering
     /// angle, rad; 0 where the robot already turns as much as it can.
     #[must_use]
     pub fn command_and_slope(&self, state: &RobotState, aim: &Aim) -> (WheelCommand, f64) {

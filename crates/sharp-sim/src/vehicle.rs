@@ -155,18 +155,23 @@ impl<S: Simulator> Vehicle<S> {
         self.finish(report)
     }
 
-    /// Reverses straight by `distance_m`, holding the heading, at most by the robot's
+    /// Reverses straight by `distance_m`, at most by the robot's
     /// [`recovery_reverse_m`](RobotModel::recovery_reverse_m); gives up after twice the time it
     /// should take. A robot that never reverses stays where it is.
     pub fn back_off(&mut self, distance_m: f64) -> ActionReport {
         let noise = self.begin_action();
         let distance_m = distance_m.min(self.robot.recovery_reverse_m);
+        let command = match self.robot.drive {
+            Drive::Differential { .. } => {
+                WheelCommand::Twist { speed_mps: -BACK_OFF_MPS, yaw_rate_radps: 0.0 }
+            }
+            Drive::Ackermann { .. } => WheelCommand::Steer { speed_mps: -BACK_OFF_MPS, steer_rad: 0.0 },
+        };
         let time_max_s = 1.0 + 2.0 * distance_m / BACK_OFF_MPS;
         let mut report = self.blank_report();
         let start = report.before.pose;
         while start.distance_m(&self.state().pose) < distance_m && report.time_s < time_max_s {
             report.contact = false;
-            let command = self.controller.reverse(self.sim.state(), start.heading, BACK_OFF_MPS);
             self.hold(command, &noise, &mut report);
         }
         self.finish(report)

@@ -38,7 +38,8 @@ impl Yaml {
         })
     }
 
-    /// Calls `visit` with the keys that lead to each value that has no entries, in the order of the file.
+    /// Calls `visit` with the keys that lead to each value that has no entries, in the order of the file. Keys without a value
+    /// say nothing.
     pub(super) fn walk<'a>(&'a self, path: &mut Vec<&'a str>, visit: &mut dyn FnMut(&[&'a str], &'a Self)) {
         if let Self::Entries(entries) = self {
             for (key, value) in entries {
@@ -46,7 +47,7 @@ impl Yaml {
                 value.walk(path, visit);
                 path.pop();
             }
-        } else {
+        } else if *self != Self::Null {
             visit(path, self);
         }
     }

@@ -1,6 +1,5 @@
 //! `sharp serve`: drives any robot or simulator from outside, one JSON line each way.
 
-use std::io::{BufRead, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -8,6 +7,7 @@ use sharp_plan::{Instruction, Plan, Reading, RemoteDriver};
 use sharp_space::{Occupancy, Pose};
 
 use crate::args::Serve;
+use crate::commands::lines::answer_lines;
 use crate::commands::run::load_tour;
 use crate::outcome::{Exit, Failure, to_json};
 
@@ -31,36 +31,27 @@ struct Reply<'a> {
 }
 
 pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
-    let tour = load_tour(Path::new(&args.place))?;
+    let folder = Path::new(&args.place);
+    if folder.is_file() {
+        let message = format!("{} is no plan's folder; a map is served with --library DIR", args.place);
+        return Err(Failure::new("USAGE", message));
+    }
+    let tour = load_tour(folder)?;
     let plan = &tour.plans[0];
     let mut driver: Option<RemoteDriver> = None;
-    let mut out = std::io::stdout().lock();
-    for (index, line) in std::io::stdin().lock().split(b'\n').enumerate() {
-        let line = line.map_err(|error| Failure::new("INPUT", format!("line {}: {error}", index + 1)))?;
-        // Bytes that are no text make a broken line, not the end.
-        let line = String::from_utf8_lossy(&line);
-        if line.trim().is_empty() {
-            continue;
-        }
-        let reply = match parse(&line, index + 1) {
-            Ok(request) => {
-                let reading = reading(&request);
-                if is_placed(plan, &reading.pose) {
-                    let begin = || RemoteDriver::new(tour.plans.clone(), &reading, true);
-                    reply(&driver.get_or_insert_with(begin).answer(&reading))
-                } else {
-                    // What it knew of the robot before stays, for the next pose may be a real one again.
-                    to_json(&Reply { waypoint: None, speed: 0.0, option: "", status: "lost" })
-                }
-            }
-            Err(failure) => failure.to_json(),
+    answer_lines(|line, number| {
+        let reading = match parse(line, number) {
+            Ok(request) => reading(&request),
+            Err(failure) => return Ok(vec![failure.to_json()]),
         };
-        // A closed pipe ends the service; there is nobody left to tell.
-        if writeln!(out, "{reply}").and_then(|()| out.flush()).is_err() {
-            break;
-        }
-    }
-    Ok(Exit::Done)
+        Ok(vec![if is_placed(plan, &reading.pose) {
+            let begin = || RemoteDriver::new(tour.plans.clone(), &reading, true);
+            reply(&driver.get_or_insert_with(begin).answer(&reading))
+        } else {
+            // What it knew of the robot before stays, for the next pose may be a real one again.
+            to_json(&Reply { waypoint: None, speed: 0.0, option: "", status: "lost" })
+        }])
+    })
 }
 
 fn parse(line: &str, number: usize) -> Result<Request, Failure> {

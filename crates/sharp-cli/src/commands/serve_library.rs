@@ -1,7 +1,5 @@
 //! `sharp serve --library`: a learnt building takes goals and poses as JSON lines, and answers with plans and waypoints.
 
-use std::io::{BufRead, Write};
-
 use serde::{Deserialize, Serialize};
 use sharp_bench::{Dispatcher, NamedWorld, SolveSettings};
 use sharp_maps::{LoadOptions, load};
@@ -10,6 +8,7 @@ use sharp_sim::SimulatorKind;
 use sharp_space::Pose;
 
 use crate::args::Serve;
+use crate::commands::lines::answer_lines;
 use crate::outcome::{Exit, Failure, to_json};
 
 /// A line from outside: one of goal, route, pose and cancel.
@@ -58,25 +57,10 @@ pub(crate) fn run(args: &Serve, seed: u64) -> Result<Exit, Failure> {
             "warning: the library knows no hand-overs, sharp learn makes them; answers take longer without"
         );
     }
-    let mut out = std::io::stdout().lock();
-    for (index, line) in std::io::stdin().lock().split(b'\n').enumerate() {
-        let line = line.map_err(|error| Failure::new("INPUT", format!("line {}: {error}", index + 1)))?;
-        // Bytes that are no text make a broken line, not the end.
-        let line = String::from_utf8_lossy(&line);
-        if line.trim().is_empty() {
-            continue;
-        }
-        let text = match parse(&line, index + 1) {
-            Ok(wish) => answer(&mut dispatcher, wish)?,
-            Err(failure) => vec![failure.to_json()],
-        };
-        let written = text.iter().try_for_each(|line| writeln!(out, "{line}")).and_then(|()| out.flush());
-        // A closed pipe ends the service; there is nobody left to tell.
-        if written.is_err() {
-            break;
-        }
-    }
-    Ok(Exit::Done)
+    answer_lines(|line, number| match parse(line, number) {
+        Ok(wish) => answer(&mut dispatcher, wish),
+        Err(failure) => Ok(vec![failure.to_json()]),
+    })
 }
 
 fn answer(dispatcher: &mut Dispatcher, wish: Wish) -> Result<Vec<String>, Failure> {
@@ -104,7 +88,10 @@ fn parse(line: &str, number: usize) -> Result<Wish, Failure> {
     let is_sane = |value: &f64| value.is_finite() && value.abs() <= 1e9;
     match (goal, route, pose, cancel) {
         (Some(goal), None, None, None) => Ok(Wish::Drive(vec![place(&goal).map_err(&broken)?])),
-        (None, Some(route), None, None) if !route.is_empty() => {
+        (None, Some(route), None, None) if route.is_empty() => {
+            Err(broken("route is empty, expected a list of goals".to_owned()))
+        }
+        (None, Some(route), None, None) => {
             Ok(Wish::Drive(route.iter().map(|goal| place(goal)).collect::<Result<_, _>>().map_err(&broken)?))
         }
         (None, None, Some(pose), None) => {
@@ -114,6 +101,7 @@ fn parse(line: &str, number: usize) -> Result<Wish, Failure> {
             Ok(Wish::At(Reading { pose: Pose::from(pose), speed_mps: speed, yaw_rate_radps: yaw_rate }))
         }
         (None, None, None, Some(true)) => Ok(Wish::Cancel),
+        (None, None, None, Some(false)) => Err(broken("cancel is false, expected true".to_owned())),
         _ => Err(broken("expected one of goal, route, pose and cancel".to_owned())),
     }
 }
