@@ -146,10 +146,11 @@ pub(crate) struct AbstractionArgs {
     /// husky, limo, turtlebot3, jackal, car or a robot file (.ron).
     #[arg(long, default_value = "husky", value_name = "NAME|FILE")]
     pub(crate) robot: String,
-    /// The kind of option.
+    /// The kind of option: interface options cross a region from one neighbour to another, centroid options lead from the
+    /// centre of a region to that of a neighbour.
     #[arg(long, value_enum, default_value_t = Kind::Interface)]
     pub(crate) options: Kind,
-    /// Where critical regions come from: net, geometric, or a file of region centres (.ron, a list of [x, y]);
+    /// Where critical regions come from: net, geometric, or a file of region centres (.ron, a list as in [(1.0, 2.5), (4.0, 2.5)]);
     /// for comparison also random and grid, as many discs as the network finds regions.
     #[arg(long, default_value = "net", value_name = "net|geometric|random|grid|FILE")]
     pub(crate) regions: String,
@@ -194,8 +195,8 @@ pub(crate) struct Solve {
     /// Drive there first, before the goal; may be repeated, in this order.
     #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true)]
     pub(crate) via: Vec<String>,
-    /// Arrive in the goal's heading, at most so many radians off [default: any heading will do].
-    #[arg(long, value_name = "RAD", conflicts_with = "via")]
+    /// Arrive in the goal's heading, at most so many radians off, or degrees as in 20deg [default: any heading will do].
+    #[arg(long, value_name = "RAD", conflicts_with = "via", value_parser = radians)]
     pub(crate) goal_heading_tolerance: Option<f64>,
     /// Exit with 1 if the plan predicts less success than this; it is written all the same.
     #[arg(long, value_name = "P", default_value_t = 0.0)]
@@ -276,6 +277,15 @@ pub(crate) struct Run {
     /// folder].
     #[arg(long, value_name = "FILE.html", num_args = 0..=1, value_parser = page_file)]
     pub(crate) show: Option<Option<PathBuf>>,
+}
+
+/// An angle in radians, or in degrees with `deg` behind it.
+fn radians(text: &str) -> Result<f64, String> {
+    let angle = match text.strip_suffix("deg") {
+        Some(degrees) => degrees.trim().parse::<f64>().map(f64::to_radians),
+        None => text.parse(),
+    };
+    angle.map_err(|_| "expected radians, or degrees as in 20deg".to_owned())
 }
 
 /// The name of a page. What follows `--show` may be the next argument of the command instead, which this tells apart.

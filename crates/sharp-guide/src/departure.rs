@@ -10,8 +10,9 @@ use sharp_space::{CollisionChecker, Pose, Vector};
 use crate::context::CHECK_STEP_M;
 use crate::inflate::GuideRobot;
 
-/// Distance between two ways of backing off, metres.
-const BACK_OFF_STEP_M: f64 = 0.1;
+/// Distances of backing off that are tried, in units of how far the robot backs off from a wall at once. Beyond the first it
+/// is the map that says that there is room, not the robot that has just come from there.
+const BACK_OFFS: [f64; 7] = [0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5];
 /// Radii that are tried for each piece of a curve, metres, the tightest first.
 const RADII_M: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, f64::INFINITY];
 /// The longest curve, metres.
@@ -55,20 +56,20 @@ pub fn is_tight(robot: &GuideRobot<'_>, start: Pose) -> bool {
 }
 
 /// The ways in which `robot` can leave `start`, each with the poses that come before the guide, the last of which is
-/// where the guide begins. It backs off by `back_off_max_m` at most.
+/// where the guide begins. `back_off_m` is how far it backs off from a wall at once; it may do so 2.5 times as far.
 #[must_use]
-pub fn departures(robot: &GuideRobot<'_>, start: Pose, back_off_max_m: f64) -> Vec<(Departure, Vec<Pose>)> {
-    let mut ways = back_offs(robot, start, back_off_max_m);
+pub fn departures(robot: &GuideRobot<'_>, start: Pose, back_off_m: f64) -> Vec<(Departure, Vec<Pose>)> {
+    let mut ways = back_offs(robot, start, back_off_m);
     let furthest = ways.last().map(|(departure, _)| *departure);
     ways.extend(curves(robot, start, Departure::default()));
     ways.extend(furthest.into_iter().flat_map(|departure| curves(robot, start, departure)));
     ways
 }
 
-fn back_offs(robot: &GuideRobot<'_>, start: Pose, most_m: f64) -> Vec<(Departure, Vec<Pose>)> {
-    let count = (most_m / BACK_OFF_STEP_M + 1e-9).floor() as usize;
-    let ways = (1..=count).map(|i| {
-        let departure = Departure { back_off_m: i as f64 * BACK_OFF_STEP_M, careful_m: 0.0 };
+fn back_offs(robot: &GuideRobot<'_>, start: Pose, at_once_m: f64) -> Vec<(Departure, Vec<Pose>)> {
+    let distances = BACK_OFFS.into_iter().map(|share| share * at_once_m).filter(|&back_off_m| back_off_m > 0.0);
+    let ways = distances.map(|back_off_m| {
+        let departure = Departure { back_off_m, careful_m: 0.0 };
         (departure, vec![departure.after_back_off(start)])
     });
     ways.take_while(|(_, lead)| robot.geometry.is_segment_free(start, lead[0], CHECK_STEP_M)).collect()
@@ -142,15 +143,15 @@ mod tests {
         let robot = GuideRobot::new(&checker, Steering::RotateTranslate);
         // Half a metre to the nose, 8 cm to the wall at 5.9 m.
         let start = Pose::new(5.32, 2.0, 0.0);
-        let ways = departures(&robot, start, 0.45);
+        let ways = departures(&robot, start, 0.4);
         let backs: Vec<f64> = ways.iter().map(|(departure, _)| departure.back_off_m).collect();
-        assert_eq!(backs.len(), 4, "0.1 m to 0.4 m: {ways:?}");
+        assert_eq!(backs.len(), 7, "0.1 m to 1 m: {ways:?}");
         assert!(
             ways.iter().all(|(departure, _)| departure.careful_m == 0.0),
             "no curve leads through the wall"
         );
-        let (furthest, lead) = &ways[3];
-        assert!((lead[0].position.x - 4.92).abs() < 1e-9, "{furthest:?} ends at {:?}", lead[0]);
+        let (furthest, lead) = &ways[6];
+        assert!((lead[0].position.x - 4.32).abs() < 1e-9, "{furthest:?} ends at {:?}", lead[0]);
         assert_eq!(departures(&robot, start, 0.0), vec![], "a robot that never reverses stays");
     }
 

@@ -124,7 +124,7 @@ pub enum NoGuide {
     #[error("start and goal are both at ({:.2}, {:.2})", .0.x, .0.y)]
     NoLength(Point),
     /// The allowed cells do not join start and goal.
-    #[error("no way through the allowed cells is wide enough for the robot")]
+    #[error("no way that the robot can drive lies inside the states that it may use")]
     Unreachable,
     /// The best path found has a place where the outline touches an obstacle.
     #[error("the robot's outline does not fit at ({:.2}, {:.2})", .0.x, .0.y)]

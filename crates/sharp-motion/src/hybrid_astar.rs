@@ -18,6 +18,10 @@ use crate::steering::Steering;
 
 /// Cost of a metre in a bend, as a multiple of a straight metre: it keeps the path from swaying.
 const BEND_PRICE: f64 = 1.1;
+/// Heading bins that an arc of the tightest bend passes, at least.
+const BINS_PER_ARC: f64 = 1.3;
+/// The longest arc in units of the usual one.
+const LONGEST_STEPS: f64 = 2.0;
 /// Stands for no node.
 const NONE: u32 = u32::MAX;
 
@@ -74,6 +78,7 @@ pub fn hybrid_astar(
     let Some(rest_m) = cost_to_go_m(checker, query.goal.position, settings) else {
         return PathOutcome::InvalidGoal;
     };
+    let settings = &settings.fitted(steering);
     let mut search = LatticeSearch::new(checker, &rest_m, settings);
     let moves = moves(steering, settings);
     search.push(query.start, 0.0, (NONE, Primitive::default()));
@@ -88,10 +93,28 @@ pub fn hybrid_astar(
     PathOutcome::Exhausted { iterations: settings.budget.iterations }
 }
 
+impl HybridSettings {
+    /// The same with arcs so long, and headings told apart so finely, that the tightest bend leaves its bin with every arc.
+    /// Else the cheapest pose of a bin, which has turned least, would hide those that have turned more, and a robot with
+    /// wide bends would never get round a corner.
+    fn fitted(&self, steering: &Steering) -> Self {
+        let tightest_m = self.tightest_m(steering);
+        let bin_rad = TAU / self.headings as f64;
+        let step_m = (BINS_PER_ARC * bin_rad * tightest_m).clamp(self.step_m, LONGEST_STEPS * self.step_m);
+        let headings = (BINS_PER_ARC * TAU * tightest_m / step_m - 1e-9).ceil() as usize;
+        Self { step_m, headings: headings.max(self.headings), ..*self }
+    }
+
+    /// The radius of the tightest bend, metres. A robot in its own tightest bend cannot turn more to correct itself: a
+    /// margin of a tenth.
+    fn tightest_m(&self, steering: &Steering) -> f64 {
+        self.bend_m.max(1.1 * steering.radius_m())
+    }
+}
+
 /// Straight on, two bends to either side, and for a robot that can: turns in place by one bin.
 fn moves(steering: &Steering, settings: &HybridSettings) -> Vec<Primitive> {
-    // A margin of a tenth: a robot in its tightest bend cannot turn more to correct itself.
-    let tightest_m = settings.bend_m.max(1.1 * steering.radius_m());
+    let tightest_m = settings.tightest_m(steering);
     let bends = [0.0, 1.0, -1.0, 0.4, -0.4];
     let travel_m = settings.step_m;
     let mut moves = bends.map(|bend| Primitive { travel_m, turn_rad: bend * travel_m / tightest_m }).to_vec();
@@ -296,6 +319,21 @@ mod tests {
                 );
                 assert!(pair[0].distance_m(&pair[1]) < 0.051 && turn < 0.14, "{steering:?}: {pair:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_car_with_wide_bends_gets_round_a_corner() {
+        let drawing: Vec<String> = (0..90).map(|_| ".".repeat(50)).collect();
+        let grid = OccupancyGrid::from_ascii(0.1, &drawing.join("\n")).unwrap();
+        let checker = FootprintChecker::new(&grid, Footprint::rectangle(1.0, 0.5).unwrap());
+        let (start, goal) = (Pose::new(2.0, 2.0, 1.57), Pose::new(3.5, 5.0, 0.0));
+        for radius_m in [1.9, 2.4] {
+            let steering = Steering::Dubins { radius_m };
+            let query = MotionQuery { start, goal };
+            let outcome = hybrid_astar(&query, &checker, &steering, &HybridSettings::default());
+            let path = outcome.path().unwrap_or_else(|| panic!("{radius_m}: no path"));
+            assert!(path.poses().iter().all(|&pose| checker.is_free(pose)), "{radius_m}: overlaps");
         }
     }
 

@@ -18,7 +18,7 @@ use crate::library::OptionLibrary;
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Phase;
-use crate::reason::{is_joined, obstruction};
+use crate::reason::{is_joined, obstruction, unturned};
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
 use crate::verify::{PlannedOption, Solution, predict, verify};
@@ -99,6 +99,9 @@ fn algorithm_1(
     for _ in 0..ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
         let Some((_, p)) = cheapest(problem, &mut search, &policies) else {
+            if monitor.should_stop() && best.is_none() {
+                return Ok(Outcome::Stopped);
+            }
             // Where the map joins start and goal, a motion planner may know a way that no options know.
             if is_joined(world, &query) && search.offer_direct() {
                 continue;
@@ -223,7 +226,10 @@ fn charge_hand_overs(search: &mut Search<'_>, steps: &[PlannedOption], failure_c
 
 /// Why there is no plan: what the map says, where that is enough, else what the search knows.
 fn describe(problem: &PlanningProblem<'_>, known: &str) -> String {
-    obstruction(problem.world, &problem.query).unwrap_or_else(|| known.to_owned())
+    let PlanningProblem { world, query, method, .. } = problem;
+    let asks_heading = method.search.goal_heading_tolerance_rad.is_some();
+    let found = obstruction(world, query).or_else(|| unturned(world, query, asks_heading));
+    found.unwrap_or_else(|| known.to_owned())
 }
 
 fn describe_search(search: &Search<'_>) -> String {
@@ -231,7 +237,8 @@ fn describe_search(search: &Search<'_>) -> String {
     match search.unguided().next() {
         Some((id, reason)) => {
             let count = search.unguided().count();
-            format!("{nothing}; {count} options have no guide, among them {id}: {reason}")
+            let options = if count == 1 { "option has" } else { "options have" };
+            format!("{nothing}; {count} {options} no guide, among them {id}: {reason}")
         }
         None => nothing.to_owned(),
     }

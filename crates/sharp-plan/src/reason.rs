@@ -4,12 +4,17 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use sharp_drive::World;
-use sharp_space::{Cell, Occupancy, Point, trig};
+use sharp_guide::ridge_routes;
+use sharp_space::{Cell, GridFrame, Heading, Occupancy, Point, Pose, trig};
 
 use crate::query::Query;
 
 /// Room beside the outline below which a way counts as narrow for a robot under noise, metres.
 const NARROW_M: f64 = 0.1;
+/// Headings at the start that are tried where none leads on from the robot's own, over a full turn.
+const HEADINGS: u32 = 16;
+/// The angle between two of them, radians.
+const TURN_RAD: f64 = std::f64::consts::TAU / HEADINGS as f64;
 /// Directions in which the width of a place is measured, over half a turn.
 const DIRECTIONS: u32 = 24;
 
@@ -23,10 +28,12 @@ pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
         }
     }
     let Some(place) = narrowest_place(world, query) else {
-        return Some(
-            "start and goal lie in separate parts of the free space: no free way joins them, however small the robot"
-                .to_owned(),
-        );
+        let separate = "start and goal lie in separate parts of the free space: no free way joins them";
+        return Some(if is_joined_by_unknown(world, query) {
+            format!("{separate}, only unknown space does (--unknown free takes it as free)")
+        } else {
+            format!("{separate}, however small the robot")
+        });
     };
     let robot_m = 2.0 * world.robot.footprint.inscribed_radius_m();
     let width_m = width_at(world, place);
@@ -39,9 +46,63 @@ pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
     })
 }
 
+/// Whether the headings are what is in the way: the robot finds no manoeuvre from its heading at the start, though a robot that
+/// looks another way there would get through, or none to the heading that the goal `asks_heading` for. `None` where they are not.
+pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Option<String> {
+    let robot = world.guide_robot();
+    let leads_on = |start: Pose| ridge_routes(&robot, start, (query.goal.position, None)).next().is_some();
+    let model = &world.robot;
+    if leads_on(query.start) {
+        let wanted = "a way leads to the goal, but none was found that arrives there in the heading that is asked for";
+        return asks_heading.then(|| wanted.to_owned());
+    }
+    let turned = |i: u32| Pose::at(query.start.position, Heading::new(query.start.heading.radians() + f64::from(i) * TURN_RAD));
+    if !(1..HEADINGS).map(turned).any(|start| world.geometry.is_free(start) && leads_on(start)) {
+        return None;
+    }
+    let needs = if model.can_turn_in_place() {
+        format!("in place it needs {:.2} m of room on all sides", model.footprint.circumscribed_radius_m())
+    } else {
+        format!("its tightest bend has a radius of {:.2} m", model.min_turning_radius_m())
+    };
+    let back = if model.recovery_reverse_m > 0.0 { "backing off does not help enough" } else { "it never reverses" };
+    Some(format!(
+        "the way to the goal is wide enough, but the {} cannot turn onto it from its heading at the start: {needs}, and {back} \
+         (recovery_reverse_m is {:.2})",
+        model.name, model.recovery_reverse_m
+    ))
+}
+
 /// Returns true if some free way joins start and goal, however narrow.
 pub(crate) fn is_joined(world: &World, query: &Query) -> bool {
     narrowest_place(world, query).is_some()
+}
+
+/// Returns true if start and goal are joined where unknown space counts as free.
+fn is_joined_by_unknown(world: &World, query: &Query) -> bool {
+    let frame = world.grid.frame();
+    let ends = (frame.cell_at(query.start.position), frame.cell_at(query.goal.position));
+    let (Some(start), Some(goal)) = ends else { return false };
+    let mut seen = vec![false; frame.len()];
+    let mut open = vec![start];
+    while let Some(cell) = open.pop() {
+        if cell == goal {
+            return true;
+        }
+        for next in beside(frame, cell).filter(|&next| world.grid.get(next) != Occupancy::Occupied) {
+            if !std::mem::replace(&mut seen[frame.index(next)], true) {
+                open.push(next);
+            }
+        }
+    }
+    false
+}
+
+/// The cells of the map on the four sides of `cell`.
+fn beside(frame: &GridFrame, Cell { row, col }: Cell) -> impl Iterator<Item = Cell> + use<> {
+    let (width, height) = (frame.width, frame.height);
+    let sides = [(row.wrapping_sub(1), col), (row + 1, col), (row, col.wrapping_sub(1)), (row, col + 1)];
+    sides.into_iter().filter(move |&(row, col)| row < height && col < width).map(|(row, col)| Cell::new(col, row))
 }
 
 /// A cell with the least clearance on the way to it; the one with the most comes first.
@@ -92,12 +153,8 @@ fn narrowest_place(world: &World, query: &Query) -> Option<Point> {
         if cell == goal {
             return Some(frame.center(narrowest));
         }
-        let Cell { row, col } = cell;
-        let beside = [(row.wrapping_sub(1), col), (row + 1, col), (row, col.wrapping_sub(1)), (row, col + 1)];
-        for (row, col) in beside {
-            let next = Cell::new(col, row);
-            let is_inside = row < frame.height && col < frame.width;
-            if is_inside && !seen[frame.index(next)] && field.at(next) > 0.0 {
+        for next in beside(frame, cell) {
+            if !seen[frame.index(next)] && field.at(next) > 0.0 {
                 let here_m = clearance_m(next);
                 let (least_m, narrowest) =
                     if here_m < least_m { (here_m, next) } else { (least_m, narrowest) };
@@ -131,7 +188,7 @@ pub(crate) fn width_at(world: &World, place: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use sharp_sim::RobotModel;
-    use sharp_space::{OccupancyGrid, Pose};
+    use sharp_space::OccupancyGrid;
 
     use super::*;
 
@@ -153,6 +210,16 @@ mod tests {
         let (world, query) = rooms(0);
         let reason = obstruction(&world, &query).expect("no way");
         assert!(reason.contains("separate parts"), "{reason}");
+    }
+
+    #[test]
+    fn unknown_space_between_two_rooms_is_named() {
+        let row = |row: usize| if matches!(row, 0 | 31) { "#".repeat(61) } else { format!("#{0}?{0}#", ".".repeat(29)) };
+        let rows: Vec<String> = (0..32).map(row).collect();
+        let grid = OccupancyGrid::from_ascii(0.1, &rows.join("\n")).expect("a sound drawing");
+        let (_, query) = rooms(0);
+        let reason = obstruction(&World::new(grid, RobotModel::husky()), &query).expect("no way");
+        assert!(reason.contains("only unknown space does"), "{reason}");
     }
 
     #[test]

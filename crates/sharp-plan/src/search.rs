@@ -177,14 +177,24 @@ impl<'a> Search<'a> {
                 return options.map(|options| (cost_s, options));
             }
             monitor.phase(Phase::Guide);
-            self.guide_all(&missing);
+            if !self.guide_while(&missing, &|| !monitor.should_stop()) {
+                return None;
+            }
         }
     }
 
     /// Plans the guides of all of `ids`.
     pub(crate) fn guide_all(&mut self, ids: &[LegId]) {
-        let guided: Vec<_> = ids.par_iter().map(|&id| (id, self.guide(id))).collect();
+        self.guide_while(ids, &|| true);
+    }
+
+    /// The same, as long as it `may_go_on`; false if it had to stop.
+    fn guide_while(&mut self, ids: &[LegId], may_go_on: &(dyn Fn() -> bool + Sync)) -> bool {
+        let guided: Vec<_> =
+            ids.par_iter().filter(|_| may_go_on()).map(|&id| (id, self.guide(id))).collect();
+        let is_whole = guided.len() == ids.len();
         guided.into_iter().for_each(|(id, option)| self.keep(id, option));
+        is_whole
     }
 
     /// What became of guiding the option called `id`; `None` if nobody tried.

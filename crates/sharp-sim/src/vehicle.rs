@@ -155,12 +155,11 @@ impl<S: Simulator> Vehicle<S> {
         self.finish(report)
     }
 
-    /// Reverses straight by `distance_m`, at most by the robot's
-    /// [`recovery_reverse_m`](RobotModel::recovery_reverse_m); gives up after twice the time it
-    /// should take. A robot that never reverses stays where it is.
+    /// Reverses straight by `distance_m`; gives up after twice the time it should take. A robot whose
+    /// [`recovery_reverse_m`](RobotModel::recovery_reverse_m) is 0 never reverses and stays where it is.
     pub fn back_off(&mut self, distance_m: f64) -> ActionReport {
         let noise = self.begin_action();
-        let distance_m = distance_m.min(self.robot.recovery_reverse_m);
+        let distance_m = if self.robot.recovery_reverse_m > 0.0 { distance_m } else { 0.0 };
         let command = match self.robot.drive {
             Drive::Differential { .. } => {
                 WheelCommand::Twist { speed_mps: -BACK_OFF_MPS, yaw_rate_radps: 0.0 }

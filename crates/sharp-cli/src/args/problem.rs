@@ -8,7 +8,7 @@ use sharp_bench::SpeedRule;
 /// Start and goal: as poses, as pixels, or by the number of a problem.
 #[derive(Debug, Args)]
 pub(crate) struct ProblemArgs {
-    /// Initial configuration: metres, metres, radians in the map's frame.
+    /// Initial configuration: metres, metres, radians in the map's frame; degrees as in 2,3,90deg.
     #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true)]
     pub(crate) start: Option<String>,
     /// Goal configuration; its heading is free and may be left out.

@@ -242,7 +242,7 @@ fn print_report(report: &SolveReport) {
     say!("library: {}", report.library);
     let time = &report.time_s;
     say!(
-        "took {:.1} s: regions {:.1}, abstraction {:.1}, search {:.1}, guides {:.1}, learning {:.1}, verification {:.1}",
+        "took {:.1} s: regions {:.1}, abstraction {:.1}, search {:.1}, guides {:.1}, learning {:.1}, verification and repair {:.1}",
         time.total,
         time.regions,
         time.abstraction,
