@@ -16,6 +16,9 @@ const UNFINISHED: [&str; 5] = [
 const PRINTING: [&str; 4] =
     [concat!("print", "ln!("), concat!("eprint", "ln!("), concat!("pri", "nt!("), concat!("epri", "nt!(")];
 
+/// Workspaces of their own, whose manifests differ.
+const STRANGERS: [&str; 2] = ["tests/downstream/", "tests/fuzz/"];
+
 /// How a manifest begins its licence if it holds files of others besides ours.
 const EXTENDED_LICENCE: &str = "\nlicense = \"(MIT OR Apache-2.0) AND ";
 
@@ -35,9 +38,8 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
             problems.extend(find(path, text, &UNFINISHED, "unfinished work belongs in an issue"));
         }
     }
-    // Projects of strangers have manifests of their own.
-    let manifests =
-        tree.matching("", "/Cargo.toml").filter(|(path, _)| !path.starts_with("tests/downstream/"));
+    let is_stranger = |path: &str| STRANGERS.iter().any(|folder| path.starts_with(folder));
+    let manifests = tree.matching("", "/Cargo.toml").filter(|(path, _)| !is_stranger(path));
     for (path, text) in manifests {
         for line in ["[lints]\nworkspace = true", "license.workspace = true"] {
             // A crate with files of others in it adds their terms to ours.

@@ -1,37 +1,16 @@
 //! `sharp serve --library`: a learnt building takes goals and poses as JSON lines, and answers with plans and waypoints.
 
-use std::io::{BufRead, Write};
+use std::io::Write;
 
-use serde::{Deserialize, Serialize};
-use sharp_bench::{Dispatcher, NamedWorld, SolveSettings};
+use serde::Serialize;
+use sharp_bench::{Dispatcher, NamedWorld, ServeLine, SolveSettings, parse_serve_line};
 use sharp_maps::{LoadOptions, load};
-use sharp_plan::{Method, Reading};
+use sharp_plan::Method;
 use sharp_sim::SimulatorKind;
-use sharp_space::Pose;
 
 use crate::args::Serve;
+use crate::lines::next_line;
 use crate::outcome::{Exit, Failure, to_json};
-
-/// A line from outside: one of goal, route, pose and cancel.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Line {
-    goal: Option<Vec<f64>>,
-    route: Option<Vec<Vec<f64>>>,
-    pose: Option<[f64; 3]>,
-    /// Forward speed, metres per second; estimated from the poses where it is left out.
-    speed: Option<f64>,
-    /// Yaw rate, radians per second; estimated likewise.
-    yaw_rate: Option<f64>,
-    cancel: Option<bool>,
-}
-
-/// What a line asks for.
-enum Wish {
-    Drive(Vec<Pose>),
-    At(Reading),
-    Cancel,
-}
 
 /// A goal that waits for the first pose.
 #[derive(Serialize)]
@@ -59,16 +38,19 @@ pub(crate) fn run(args: &Serve, seed: u64) -> Result<Exit, Failure> {
         );
     }
     let mut out = std::io::stdout().lock();
-    for (index, line) in std::io::stdin().lock().split(b'\n').enumerate() {
-        let line = line.map_err(|error| Failure::new("INPUT", format!("line {}: {error}", index + 1)))?;
-        // Bytes that are no text make a broken line, not the end.
-        let line = String::from_utf8_lossy(&line);
-        if line.trim().is_empty() {
+    let mut input = std::io::stdin().lock();
+    for number in 1_usize.. {
+        let line = next_line(&mut input)
+            .map_err(|error| Failure::new("INPUT", format!("line {number}: {error}")))?;
+        let Some(line) = line else { break };
+        if line.as_ref().is_ok_and(|line| line.trim().is_empty()) {
             continue;
         }
-        let text = match parse(&line, index + 1) {
+        let text = match line.and_then(|line| parse_serve_line(&line)) {
             Ok(wish) => answer(&mut dispatcher, wish)?,
-            Err(failure) => vec![failure.to_json()],
+            Err(problem) => {
+                vec![Failure::new("LINE_INVALID", format!("line {number}: {problem}")).to_json()]
+            }
         };
         let written = text.iter().try_for_each(|line| writeln!(out, "{line}")).and_then(|()| out.flush());
         // A closed pipe ends the service; there is nobody left to tell.
@@ -79,50 +61,20 @@ pub(crate) fn run(args: &Serve, seed: u64) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn answer(dispatcher: &mut Dispatcher, wish: Wish) -> Result<Vec<String>, Failure> {
+fn answer(dispatcher: &mut Dispatcher, wish: ServeLine) -> Result<Vec<String>, Failure> {
     let lines = match wish {
-        Wish::Drive(goals) => {
+        ServeLine::Drive(goals) => {
             let lines = dispatcher.send(&goals)?;
             if lines.is_empty() {
                 return Ok(vec![to_json(&Waiting { status: "waiting_for_pose", goals: goals.len() })]);
             }
             lines
         }
-        Wish::At(reading) => dispatcher.drive(&reading)?,
-        Wish::Cancel => {
+        ServeLine::At(reading) => dispatcher.drive(&reading)?,
+        ServeLine::Cancel => {
             dispatcher.cancel();
             return Ok(vec![to_json(&Waiting { status: "cancelled", goals: 0 })]);
         }
     };
     Ok(lines.iter().map(to_json).collect())
-}
-
-fn parse(line: &str, number: usize) -> Result<Wish, Failure> {
-    let broken = |problem: String| Failure::new("LINE_INVALID", format!("line {number}: {problem}"));
-    let line: Line = serde_json::from_str(line).map_err(|error| broken(error.to_string()))?;
-    let Line { goal, route, pose, speed, yaw_rate, cancel } = line;
-    let is_sane = |value: &f64| value.is_finite() && value.abs() <= 1e9;
-    match (goal, route, pose, cancel) {
-        (Some(goal), None, None, None) => Ok(Wish::Drive(vec![place(&goal).map_err(&broken)?])),
-        (None, Some(route), None, None) if !route.is_empty() => {
-            Ok(Wish::Drive(route.iter().map(|goal| place(goal)).collect::<Result<_, _>>().map_err(&broken)?))
-        }
-        (None, None, Some(pose), None) => {
-            if !pose.iter().chain(&speed).chain(&yaw_rate).all(is_sane) {
-                return Err(broken("pose, speed and yaw_rate must be finite".to_owned()));
-            }
-            Ok(Wish::At(Reading { pose: Pose::from(pose), speed_mps: speed, yaw_rate_radps: yaw_rate }))
-        }
-        (None, None, None, Some(true)) => Ok(Wish::Cancel),
-        _ => Err(broken("expected one of goal, route, pose and cancel".to_owned())),
-    }
-}
-
-/// A goal of two or three numbers.
-fn place(numbers: &[f64]) -> Result<Pose, String> {
-    match *numbers {
-        [x, y] if x.is_finite() && y.is_finite() => Ok(Pose::new(x, y, 0.0)),
-        [x, y, yaw] if numbers.iter().all(|number| number.is_finite()) => Ok(Pose::new(x, y, yaw)),
-        _ => Err(format!("a goal is {numbers:?}, expected [x, y] or [x, y, yaw]")),
-    }
 }
