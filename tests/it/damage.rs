@@ -32,8 +32,11 @@ fn library() -> tempfile::TempDir {
     let library = OptionLibrary::open(root.path(), "key-map").expect("empty");
     let world = World::new(rooms(), RobotModel::limo());
     let mut sharp = Sharp::new(world, GeometricDetector::default()).with_method(method).with_library(library);
-    let query = Query { start: Pose::new(1.0, 1.0, 0.0), goal: Pose::new(15.0, 1.0, 0.0) };
-    assert!(matches!(sharp.solve(query, &()), Ok(Answer::Solved(_))), "there is a way");
+    let ends = [Pose::new(1.0, 1.0, 0.0), Pose::new(15.0, 1.0, 0.0)];
+    for (start, goal) in [(0, 1), (1, 0)] {
+        let query = Query { start: ends[start], goal: ends[goal] };
+        assert!(matches!(sharp.solve(query, &()), Ok(Answer::Solved(_))), "there is a way");
+    }
     sharp.library_mut().save().expect("written");
     root
 }
