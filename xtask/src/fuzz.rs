@@ -219,7 +219,7 @@ fn files_below(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// The workspace of the targets.
-fn source() -> PathBuf {
+pub(crate) fn source() -> PathBuf {
     tree::root().join("tests/fuzz")
 }
 

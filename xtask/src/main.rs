@@ -33,7 +33,7 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   ci [STEPS]             everything that must pass: format, tidy, packages, clippy, docs, tests,
-                         examples, downstream; or only the steps named
+                         examples, downstream, fuzz; or only the steps named
   tidy                   house rules that no compiler checks
   soak [NAMES]           tests/soak with many cases: hours; or only the tests that a name is part of
   fuzz [TARGETS] [--seconds S]

@@ -16,6 +16,9 @@ const UNFINISHED: [&str; 5] = [
 const PRINTING: [&str; 4] =
     [concat!("print", "ln!("), concat!("eprint", "ln!("), concat!("pri", "nt!("), concat!("epri", "nt!(")];
 
+/// What opens connections: the project works without a network.
+const CONNECTING: [&str; 1] = [concat!("std:", ":net")];
+
 /// Workspaces of their own, whose manifests differ.
 const STRANGERS: [&str; 2] = ["tests/downstream/", "tests/fuzz/"];
 
@@ -31,6 +34,9 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
         }
         if is_library(path) {
             problems.extend(find(path, library_code(text), &PRINTING, "library code must not print"));
+        }
+        if path.starts_with("crates/") {
+            problems.extend(find(path, text, &CONNECTING, "nothing here uses a network"));
         }
     }
     for ending in [".rs", ".md", ".toml"] {
@@ -49,6 +55,11 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
                 problems.push(Finding::new(path, 1, message));
             }
         }
+    }
+    if let Some(text) = tree.files.get("Cargo.toml").filter(|text| !text.contains("unsafe_code = \"forbid\""))
+    {
+        let line = text.lines().count();
+        problems.push(Finding::new("Cargo.toml", line, "must forbid unsafe code in every package"));
     }
     problems
 }
@@ -136,6 +147,10 @@ mod tests {
         let extended = "\nlicense = \"(MIT OR Apache-2.0) AND OFL-1.1\"\n[lints]\nworkspace = true\n";
         assert!(problems("crates/a/Cargo.toml", extended).is_empty(), "with the terms of a font");
         assert_eq!(problems("crates/a/Cargo.toml", "").len(), 2, "both missing");
-        assert!(problems("Cargo.toml", "").is_empty(), "the workspace's own manifest");
+        assert!(
+            problems("Cargo.toml", "unsafe_code = \"forbid\"").is_empty(),
+            "the workspace's own manifest"
+        );
+        assert_eq!(problems("Cargo.toml", "").len(), 1, "it forbids unsafe code");
     }
 }
