@@ -29,52 +29,26 @@ const SECONDS: u32 = 20;
 /// A program of `tests/fuzz`.
 struct Target {
     name: &'static str,
-    /// The package that holds it.
-    package: &'static str,
     /// Folders of the repository, and endings, whose files are seeds.
     assets: &'static [(&'static str, &'static str)],
     /// Endings of the real maps that are seeds.
     real: &'static [&'static str],
 }
 
-const FORMATS: &str = "fuzz-formats";
-const SERVICES: &str = "fuzz-services";
-
-const TARGETS: [Target; 14] = [
-    Target { name: "map_yaml", package: FORMATS, assets: &[], real: &["yaml"] },
-    Target { name: "map_image", package: FORMATS, assets: &[], real: &["pgm", "png"] },
-    Target { name: "movingai_map", package: FORMATS, assets: &[], real: &["map"] },
-    Target { name: "movingai_scenario", package: FORMATS, assets: &[], real: &["scen"] },
-    Target {
-        name: "floor_plan",
-        package: FORMATS,
-        assets: &[("crates/sharp-maps/assets", "ron")],
-        real: &[],
-    },
-    Target {
-        name: "robot",
-        package: FORMATS,
-        assets: &[("crates/sharp-sim/assets/robots", "ron")],
-        real: &[],
-    },
-    Target {
-        name: "noise",
-        package: FORMATS,
-        assets: &[("crates/sharp-sim/assets/noise", "ron")],
-        real: &[],
-    },
-    Target {
-        name: "weights",
-        package: FORMATS,
-        assets: &[("crates/sharp-drive/assets", "safetensors")],
-        real: &[],
-    },
-    Target { name: "library", package: FORMATS, assets: &[], real: &[] },
-    Target { name: "plan", package: FORMATS, assets: &[], real: &[] },
-    Target { name: "abstraction", package: FORMATS, assets: &[], real: &[] },
-    Target { name: "jobs", package: SERVICES, assets: &[], real: &[] },
-    Target { name: "serve_line", package: SERVICES, assets: &[], real: &[] },
-    Target { name: "robot_import", package: SERVICES, assets: &[], real: &["yaml", "urdf", "xacro"] },
+const TARGETS: [Target; 13] = [
+    Target { name: "map_yaml", assets: &[], real: &["yaml"] },
+    Target { name: "map_image", assets: &[], real: &["pgm", "png"] },
+    Target { name: "movingai_map", assets: &[], real: &["map"] },
+    Target { name: "movingai_scenario", assets: &[], real: &["scen"] },
+    Target { name: "floor_plan", assets: &[("crates/sharp-maps/assets", "ron")], real: &[] },
+    Target { name: "robot", assets: &[("crates/sharp-sim/assets/robots", "ron")], real: &[] },
+    Target { name: "noise", assets: &[("crates/sharp-sim/assets/noise", "ron")], real: &[] },
+    Target { name: "weights", assets: &[("crates/sharp-drive/assets", "safetensors")], real: &[] },
+    Target { name: "library", assets: &[], real: &[] },
+    Target { name: "plan", assets: &[], real: &[] },
+    Target { name: "abstraction", assets: &[], real: &[] },
+    Target { name: "serve_line", assets: &[], real: &[] },
+    Target { name: "robot_import", assets: &[], real: &["yaml", "urdf", "xacro"] },
 ];
 
 /// Builds and runs the targets that `args` name, all by default, each for `--seconds` (20).
@@ -97,29 +71,22 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     run_targets(&TARGETS.iter().filter(is_wanted).collect::<Vec<_>>(), seconds)
 }
 
-/// The step of `cargo xtask ci`: what reads files, 20 seconds each. The services need all of the project built again
-/// with instrumentation, which takes too long for every change.
+/// The step of `cargo xtask ci`: every target for 20 seconds.
 ///
 /// # Errors
 /// Returns an error if cargo or a target cannot be started.
 pub(crate) fn step() -> anyhow::Result<u8> {
-    let is_light = |target: &&Target| target.package == FORMATS;
-    run_targets(&TARGETS.iter().filter(is_light).collect::<Vec<_>>(), SECONDS)
+    run_targets(&TARGETS.iter().collect::<Vec<_>>(), SECONDS)
 }
 
 fn run_targets(targets: &[&Target], seconds: u32) -> anyhow::Result<u8> {
     let host = host()?;
-    for package in [FORMATS, SERVICES] {
-        if !targets.iter().any(|target| target.package == package) {
-            continue;
-        }
-        let mut build = cargo(&["build", "--release", "--locked", "--package", package, "--target", &host]);
-        // With a target of its own, programs that run while building are not instrumented.
-        build.current_dir(source()).env("RUSTFLAGS", RUSTFLAGS).env("CARGO_TARGET_DIR", work());
-        let code = exit_code(&mut build)?;
-        if code != 0 {
-            return Ok(code);
-        }
+    let mut build = cargo(&["build", "--release", "--locked", "--target", &host]);
+    // With a target of its own, programs that run while building are not instrumented.
+    build.current_dir(source()).env("RUSTFLAGS", RUSTFLAGS).env("CARGO_TARGET_DIR", work());
+    let code = exit_code(&mut build)?;
+    if code != 0 {
+        return Ok(code);
     }
     let mut broken = Vec::new();
     for target in targets {

@@ -16,6 +16,7 @@ pub(crate) fn run(names: &[String]) -> anyhow::Result<u8> {
     command.args(["--test", "promises"]);
     // One after the other, so that the memory that a test sees is its own; each uses all cores.
     command.args(["--no-fail-fast", "--", "--nocapture", "--test-threads", "1"]).args(names);
-    command.env("SHARP_SOAK", "1").env("SHARP_KILLS", KILLS);
+    let share = std::env::var("SHARP_SOAK").unwrap_or_else(|_| "1".to_owned());
+    command.env("SHARP_SOAK", share).env("SHARP_KILLS", KILLS);
     exit_code(&mut command)
 }

@@ -2,7 +2,12 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use sharp_bench::{ServeLine, parse_pose_line, parse_serve_line};
+
+// By its source: the crate that holds it would take all of the project along.
+#[path = "../../../../../crates/sharp-bench/src/serve_line.rs"]
+mod serve_line;
+
+use serve_line::{ServeLine, parse_pose_line, parse_serve_line};
 
 fuzz_target!(|text: &str| {
     let at = parse_pose_line(text);
