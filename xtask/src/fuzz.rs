@@ -27,7 +27,7 @@ const SEED_MAX_BYTES: u64 = 64 << 10;
 const SECONDS: u32 = 20;
 
 /// A program of `tests/fuzz`.
-struct Target {
+struct FuzzTarget {
     name: &'static str,
     /// Folders of the repository, and endings, whose files are seeds.
     assets: &'static [(&'static str, &'static str)],
@@ -35,20 +35,20 @@ struct Target {
     real: &'static [&'static str],
 }
 
-const TARGETS: [Target; 13] = [
-    Target { name: "map_yaml", assets: &[], real: &["yaml"] },
-    Target { name: "map_image", assets: &[], real: &["pgm", "png"] },
-    Target { name: "movingai_map", assets: &[], real: &["map"] },
-    Target { name: "movingai_scenario", assets: &[], real: &["scen"] },
-    Target { name: "floor_plan", assets: &[("crates/sharp-maps/assets", "ron")], real: &[] },
-    Target { name: "robot", assets: &[("crates/sharp-sim/assets/robots", "ron")], real: &[] },
-    Target { name: "noise", assets: &[("crates/sharp-sim/assets/noise", "ron")], real: &[] },
-    Target { name: "weights", assets: &[("crates/sharp-drive/assets", "safetensors")], real: &[] },
-    Target { name: "library", assets: &[], real: &[] },
-    Target { name: "plan", assets: &[], real: &[] },
-    Target { name: "abstraction", assets: &[], real: &[] },
-    Target { name: "serve_line", assets: &[], real: &[] },
-    Target { name: "robot_import", assets: &[], real: &["yaml", "urdf", "xacro"] },
+const TARGETS: [FuzzTarget; 13] = [
+    FuzzTarget { name: "map_yaml", assets: &[], real: &["yaml"] },
+    FuzzTarget { name: "map_image", assets: &[], real: &["pgm", "png"] },
+    FuzzTarget { name: "movingai_map", assets: &[], real: &["map"] },
+    FuzzTarget { name: "movingai_scenario", assets: &[], real: &["scen"] },
+    FuzzTarget { name: "floor_plan", assets: &[("crates/sharp-maps/assets", "ron")], real: &[] },
+    FuzzTarget { name: "robot", assets: &[("crates/sharp-sim/assets/robots", "ron")], real: &[] },
+    FuzzTarget { name: "noise", assets: &[("crates/sharp-sim/assets/noise", "ron")], real: &[] },
+    FuzzTarget { name: "weights", assets: &[("crates/sharp-drive/assets", "safetensors")], real: &[] },
+    FuzzTarget { name: "library", assets: &[], real: &[] },
+    FuzzTarget { name: "plan", assets: &[], real: &[] },
+    FuzzTarget { name: "abstraction", assets: &[], real: &[] },
+    FuzzTarget { name: "serve_line", assets: &[], real: &[] },
+    FuzzTarget { name: "robot_import", assets: &[], real: &["yaml", "urdf", "xacro"] },
 ];
 
 /// Builds and runs the targets that `args` name, all by default, each for `--seconds` (20).
@@ -67,7 +67,7 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
         let known = TARGETS.map(|target| target.name).join(", ");
         bail!("no target is called {name}, there are {known}");
     }
-    let is_wanted = |target: &&Target| names.is_empty() || names.iter().any(|name| *name == target.name);
+    let is_wanted = |target: &&FuzzTarget| names.is_empty() || names.iter().any(|name| *name == target.name);
     run_targets(&TARGETS.iter().filter(is_wanted).collect::<Vec<_>>(), seconds)
 }
 
@@ -79,7 +79,7 @@ pub(crate) fn step() -> anyhow::Result<u8> {
     run_targets(&TARGETS.iter().collect::<Vec<_>>(), SECONDS)
 }
 
-fn run_targets(targets: &[&Target], seconds: u32) -> anyhow::Result<u8> {
+fn run_targets(targets: &[&FuzzTarget], seconds: u32) -> anyhow::Result<u8> {
     let host = host()?;
     let mut build = cargo(&["build", "--release", "--locked", "--target", &host]);
     // With a target of its own, programs that run while building are not instrumented.
@@ -104,7 +104,7 @@ fn run_targets(targets: &[&Target], seconds: u32) -> anyhow::Result<u8> {
 }
 
 /// Runs one target on its corpus for some seconds; returns its exit code.
-fn run_target(target: &Target, host: &str, seconds: u32) -> anyhow::Result<u8> {
+fn run_target(target: &FuzzTarget, host: &str, seconds: u32) -> anyhow::Result<u8> {
     let folder = |kind: &str| -> anyhow::Result<PathBuf> {
         let folder = work().join(kind).join(target.name);
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -142,7 +142,7 @@ fn files_folder(target: &str) -> PathBuf {
 }
 
 /// Copies the seeds of `target` into `folder`.
-fn gather(target: &Target, folder: &Path) -> anyhow::Result<()> {
+fn gather(target: &FuzzTarget, folder: &Path) -> anyhow::Result<()> {
     let own = source().join("seeds").join(target.name);
     let mut found: Vec<PathBuf> = files_below(&own)?;
     for (assets, ending) in target.assets {
