@@ -58,6 +58,9 @@ fn starts_and_goals_of_every_kind_are_answered_with_nav2_s_codes() {
     }
 }
 
+/// Says of a column and a row whether the cell is free.
+type Drawn = Box<dyn Fn(usize, usize) -> bool>;
+
 #[test]
 fn maps_that_hardly_are_any_are_answered_in_bounded_time() {
     let place = Small::new();
@@ -65,7 +68,7 @@ fn maps_that_hardly_are_any_are_answered_in_bounded_time() {
     // 30 m of specks take minutes.
     let side = cases(120, 300) as usize;
     // Specks of one cell, one for every metre, and what a checkerboard leaves: nothing.
-    let maps: [(&str, usize, usize, Box<dyn Fn(usize, usize) -> bool>); 9] = [
+    let maps: [(&str, usize, usize, Drawn); 9] = [
         ("all free", 120, 120, Box::new(|_, _| true)),
         ("all occupied", 120, 120, Box::new(|_, _| false)),
         ("one free cell", 1, 1, Box::new(|_, _| true)),

@@ -21,11 +21,10 @@ fn touched(trace: &str, folder: &Path) -> (BTreeSet<PathBuf>, Vec<String>) {
             sockets.push(line.to_owned());
             continue;
         }
-        let is_open = matches!(call, "open" | "openat");
         // A file without a name, to see whether one could be made, is gone when it is closed.
-        if is_open && args.contains("O_TMPFILE")
-            || is_open && !["O_WRONLY", "O_RDWR", "O_CREAT"].iter().any(|flag| args.contains(flag))
-        {
+        let is_written = ["O_WRONLY", "O_RDWR", "O_CREAT"].iter().any(|flag| args.contains(flag));
+        let is_kept = is_written && !args.contains("O_TMPFILE");
+        if matches!(call, "open" | "openat") && !is_kept {
             continue;
         }
         // Of each file the folder that it is named from, as `5</tmp/x>, ` or `AT_FDCWD</tmp/x>, `, and the name.
