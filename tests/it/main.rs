@@ -1,6 +1,7 @@
 //! One binary of integration tests: it links once.
 #[path = "../common/checker.rs"]
 mod checker;
+mod damage;
 mod determinism;
 mod learning;
 mod library;

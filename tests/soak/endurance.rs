@@ -5,10 +5,12 @@ use std::time::Instant;
 
 use rand::RngExt;
 use sharp_drive::World;
-use sharp_plan::{Answer, Method, Plan, Query, Reading, RemoteDriver, Sharp};
+use sharp_options::OptionId;
+use sharp_plan::{Answer, Method, OptionLibrary, Plan, Query, Reading, RemoteDriver, Sharp};
+use sharp_rbvd::StateId;
 use sharp_regions::GeometricDetector;
 use sharp_sim::RobotModel;
-use sharp_space::{Pose, Seed};
+use sharp_space::{OccupancyGrid, Pose, Seed};
 
 use crate::worlds::Drawing;
 use crate::{cases, told};
@@ -44,6 +46,16 @@ fn hall() -> World {
     World::new(drawing.grid(0.1), RobotModel::limo())
 }
 
+/// Four rooms in a row with doors at either end by turns.
+fn row_of_rooms() -> OccupancyGrid {
+    let mut drawing = Drawing::room(160, 40);
+    for (col, door) in [(40, 4..18), (80, 22..36), (120, 4..18)] {
+        drawing.paint(col..col + 2, 0..40, true);
+        drawing.paint(col..col + 2, door, false);
+    }
+    drawing.grid(0.1)
+}
+
 fn quick() -> Method {
     Method::fast().with_episodes(20, 20, 20)
 }
@@ -58,6 +70,30 @@ fn solving_again_and_again_leaks_nothing() {
         let answer = sharp.solve(query, &()).expect("there is room");
         assert!(matches!(answer, Answer::Solved(_)), "{query:?}: {answer:?}");
     });
+}
+
+#[test]
+fn a_library_of_a_thousand_options_opens_in_bounded_time() {
+    let root = tempfile::tempdir().expect("a folder");
+    let mut method = quick();
+    method.search.direct = false;
+    let library = OptionLibrary::open(root.path(), "key-map").expect("empty");
+    let world = World::new(row_of_rooms(), RobotModel::limo());
+    let mut sharp = Sharp::new(world, GeometricDetector::default()).with_method(method).with_library(library);
+    let query = Query { start: Pose::new(1.0, 1.0, 0.0), goal: Pose::new(15.0, 1.0, 0.0) };
+    assert!(matches!(sharp.solve(query, &()), Ok(Answer::Solved(_))), "there is a way");
+    let library = sharp.library_mut();
+    let option = library.iter().next().expect("an option was learnt").1.clone();
+    for number in 0..1000 {
+        let id = OptionId::Centroid { from: StateId(number), to: StateId(number + 1) };
+        library.insert(id, option.clone()).expect("there is room");
+    }
+    library.save().expect("written");
+    let since = Instant::now();
+    let opened = OptionLibrary::open(root.path(), "key-map").expect("sound");
+    assert!(opened.len() >= 1000, "{} options", opened.len());
+    told("options of one library that is opened", opened.len() as u64, "all are sound", since);
+    assert!(since.elapsed().as_secs_f64() < 10.0, "it took {:?}", since.elapsed());
 }
 
 #[test]

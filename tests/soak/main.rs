@@ -18,9 +18,10 @@ mod worlds;
 
 use std::time::Instant;
 
-/// How many cases to try: `few`, or `many` where the variable `SHARP_SOAK` is set.
+/// How many cases to try: `few`, or the share of `many` that the variable `SHARP_SOAK` says, as in 1 or 0.1.
 fn cases(few: u64, many: u64) -> u64 {
-    if std::env::var_os("SHARP_SOAK").is_some() { many } else { few }
+    let share = std::env::var("SHARP_SOAK").ok().and_then(|share| share.parse::<f64>().ok());
+    share.map_or(few, |share| few.max((many as f64 * share) as u64))
 }
 
 /// Says what a promise was held against; `cargo xtask soak` shows it.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use rand::RngExt;
-use sharp_bench::{ImportWishes, import_robot};
+use sharp_bench::{ImportWishes, Manifest, Suite, SuiteSelection, import_robot};
 use sharp_drive::World;
 use sharp_maps::{LoadOptions, load, load_doors, load_scenario};
 use sharp_plan::{Answer, Method, OptionLibrary, Plan, Query, Sharp};
@@ -173,6 +173,20 @@ fn robots_noise_and_what_they_are_imported_from() {
             let _ = NoiseModel::from_ron(&text);
         }
         let _ = import_robot(&[at("p.yaml"), at("r.urdf")], &wishes);
+    });
+}
+
+#[test]
+fn plans_of_jobs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut experiments = SuiteSelection::new(Suite::Smoke, 1).experiments().expect("a suite");
+    experiments.truncate(3);
+    Manifest::extend(folder.path(), experiments, "by hand").expect("written");
+    let files = files_below(folder.path());
+    try_files("plans of jobs", folder.path(), &files, cases(200, 100_000), || {
+        if let Err(error) = Manifest::open(folder.path()) {
+            assert!(error.to_string().contains("manifest.jsonl"), "a message names the file: {error}");
+        }
     });
 }
 

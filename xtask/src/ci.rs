@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::ensure;
 
 use crate::process::{cargo, exit_code};
-use crate::{downstream, examples, packages, tidy};
+use crate::{downstream, examples, fuzz, packages, tidy};
 
 /// Runs the steps in order up to the first that fails, and says how long each took; with `names` only these.
 ///
@@ -39,7 +39,7 @@ pub(crate) fn run(names: &[String]) -> anyhow::Result<u8> {
 type Step = fn() -> anyhow::Result<u8>;
 
 /// Cheap steps first.
-const STEPS: [(&str, Step); 8] = [
+const STEPS: [(&str, Step); 9] = [
     ("format", format),
     ("tidy", tidy::run),
     ("packages", packages::run),
@@ -48,12 +48,14 @@ const STEPS: [(&str, Step); 8] = [
     ("tests", tests),
     ("examples", examples::run),
     ("downstream", downstream::run),
+    ("fuzz", fuzz::step),
 ];
 
 fn format() -> anyhow::Result<u8> {
     let code = exit_code(&mut cargo(&["fmt", "--all", "--check"]))?;
     let downstream = exit_code(cargo(&["fmt", "--check"]).current_dir(downstream::folder()))?;
-    Ok(code.max(downstream))
+    let fuzz = exit_code(cargo(&["fmt", "--check"]).current_dir(fuzz::source()))?;
+    Ok(code.max(downstream).max(fuzz))
 }
 
 fn clippy() -> anyhow::Result<u8> {

@@ -11,6 +11,7 @@ mod ci;
 mod downstream;
 mod eval;
 mod examples;
+mod fuzz;
 mod packages;
 mod peers;
 mod peers_learning;
@@ -32,9 +33,11 @@ const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
   ci [STEPS]             everything that must pass: format, tidy, packages, clippy, docs, tests,
-                         examples, downstream; or only the steps named
+                         examples, downstream, fuzz; or only the steps named
   tidy                   house rules that no compiler checks
   soak [NAMES]           tests/soak with many cases: hours; or only the tests that a name is part of
+  fuzz [TARGETS] [--seconds S]
+                         libFuzzer on what reads files and lines (tests/fuzz), S seconds each (20)
   stats                  a table of lines, functions and docs of each crate
   train-regions [ARGS]   sharp regions train ARGS, on the ndarray device by default
   train-prior [ARGS]     sharp prior train ARGS, for both robots by default
@@ -57,6 +60,7 @@ fn main() -> ExitCode {
         "ci" => ci::run(rest),
         "tidy" => tidy::run(),
         "soak" => soak::run(rest),
+        "fuzz" => fuzz::run(rest),
         "stats" => Tree::load().map(|tree| {
             print!("{}", stats::table(&tree));
             0

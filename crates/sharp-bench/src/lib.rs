@@ -45,6 +45,7 @@ mod prior;
 mod reports;
 mod result;
 mod robot_import;
+mod serve_line;
 mod show;
 mod solve;
 mod speed_mask;
@@ -84,6 +85,7 @@ pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
 };
 pub use robot_import::{ImportError, ImportWishes, ImportedField, ImportedRobot, import_robot};
+pub use serve_line::{ServeLine, parse_pose_line, parse_serve_line};
 pub use show::PlanPage;
 pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
 pub use speed_mask::{SpeedMaskError, SpeedRule, speed_limits};

@@ -1,4 +1,5 @@
-//! What the program does, frozen: rows of the smoke suite, plans with their weights, abstractions, priors.
+//! What the program does, frozen: rows of the smoke suite, plans with their weights, abstractions, priors, and what
+//! each stage leaves on the way from a map to a drive, the same for one thread and two.
 //!
 //! A change that is meant to change nothing leaves `golden.txt` alone. A part of it is checked with every test
 //! run; `SHARP_GOLDEN=all` checks all of it, which takes four minutes of one core. After a wanted change
@@ -141,6 +142,44 @@ fn plans(folder: &Path, part: Part, golden: &mut BTreeMap<String, String>) {
     }
 }
 
+/// The hash of what each stage leaves, on the way from a map to a drive, with `threads` threads.
+fn stages(folder: &Path, threads: &str) -> BTreeMap<String, String> {
+    let place = folder.join(format!("stages-{threads}"));
+    fs::create_dir(&place).expect("a folder");
+    for command in [
+        "map save a --out map",
+        "regions predict a --robot limo --out regions",
+        "abstract a --robot limo --out abstract",
+        "solve a --problem 5 --robot limo --library library --out plan",
+        "run plan --episodes 10",
+    ] {
+        let args: Vec<&str> = command.split(' ').chain(["--threads", threads]).collect();
+        sharp(&place, &args);
+    }
+    let library = fs::read_dir(place.join("library")).expect("a library").next();
+    let library = library.expect("one world").expect("an entry").path();
+    let mut options: Vec<_> =
+        fs::read_dir(library).expect("options").map(|entry| entry.expect("an entry").path()).collect();
+    options.sort();
+    let options: Vec<u8> = options.iter().flat_map(|path| fs::read(path).expect("an option")).collect();
+    let mut drive: Value =
+        serde_json::from_slice(&fs::read(place.join("plan/run.json")).expect("a report")).expect("JSON");
+    drive.as_object_mut().expect("an object").remove("decision_us").expect("decisions are timed");
+    let read = |name: &str| hash(&fs::read(place.join(name)).expect(name));
+    [
+        ("1 map", read("map.pgm")),
+        ("2 regions", read("regions/regions.json")),
+        ("3 abstraction", read("abstract/abstraction.ron")),
+        ("4 guides", read("abstract/route.geojson")),
+        ("5 library", hash(&options)),
+        ("6 plan", read("plan/plan.ron")),
+        ("7 drive", hash(drive.to_string().as_bytes())),
+        ("8 picture", read("plan/run.svg")),
+    ]
+    .map(|(stage, hash)| (format!("stage {stage}"), hash))
+    .into()
+}
+
 /// The rows of `sharp eval smoke`, without what depends on time, machine or build.
 fn suite(folder: &Path, golden: &mut BTreeMap<String, String>) {
     sharp(folder, &["eval", "smoke", "--out", "eval"]);
@@ -183,6 +222,9 @@ fn the_program_does_what_it_did() {
     priors(&mut golden);
     abstractions(folder.path(), part, &mut golden);
     plans(folder.path(), part, &mut golden);
+    let [one, two] = ["1", "2"].map(|threads| stages(folder.path(), threads));
+    assert_eq!(one, two, "one thread and two leave the same at every stage");
+    golden.extend(one);
     if part == Part::All {
         suite(folder.path(), &mut golden);
     }

@@ -70,7 +70,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     // What the user's umask allows, like any other file; temporary files are private by default.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(io(folder))?;
+    let mut file = builder.tempfile_in(folder).map_err(io(path))?;
     file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(io(path))?;
     file.persist(path).map_err(|error| io(path)(error.error))?;
     Ok(())
@@ -122,7 +122,22 @@ pub fn read_ron<T: DeserializeOwned>(path: &Path) -> Result<T, FileError> {
     if head.strip_prefix(PREFIX) != Some(hash(body.as_bytes()).as_str()) {
         return Err(FileError::Checksum { path: path.to_owned() });
     }
+    if let Some(line) = nan_line(body) {
+        return Err(FileError::content(path, format!("line {line} holds NaN, expected numbers")));
+    }
     ron::from_str(body).map_err(|error| FileError::content(path, error))
+}
+
+/// The first line of the RON text `body` that has NaN for a number, from 2 as the checksum is the first. Nothing that is written
+/// holds one, and whoever reads it need not look.
+fn nan_line(body: &str) -> Option<usize> {
+    let is_nan = |line: &str| {
+        // Outside of quotes: a robot may be called NaN.
+        let plain = line.split('"').step_by(2);
+        let mut words = plain.flat_map(|text| text.split(|c: char| !c.is_alphanumeric() && c != '_'));
+        words.any(|word| word == "NaN")
+    };
+    body.lines().position(is_nan).map(|index| index + 2)
 }
 
 /// Writes `bytes` into `folder` under the name of their hash and returns that name.
@@ -176,6 +191,18 @@ mod tests {
         fs::write(folder.path().join(&blob), [1, 2, 4]).unwrap();
         assert!(matches!(read_blob(folder.path(), &blob), Err(FileError::Checksum { .. })), "damaged blob");
         assert!(read_blob(folder.path(), "../../etc/passwd").is_err(), "path traversal");
+    }
+
+    /// Fuzzing found it: a plan with NaN for a follower's softness was read, and sent the robot nowhere.
+    #[test]
+    fn what_holds_no_number_is_refused_under_a_checksum_that_fits() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("value.ron");
+        write_ron(&path, &vec![1.5, f64::NAN]).unwrap();
+        let error = read_ron::<Vec<f64>>(&path).unwrap_err().to_string();
+        assert!(error.contains("value.ron: line 2 holds NaN"), "{error}");
+        write_ron(&path, &("NaN, a name", f64::INFINITY)).unwrap();
+        assert_eq!(read_ron::<(String, f64)>(&path).unwrap().1, f64::INFINITY, "which is one");
     }
 
     #[test]

@@ -225,6 +225,14 @@ impl Plan {
             None => world,
         };
         let goal = goal_of(file.goal, &world, method.search.goal_heading_tolerance_rad);
+        if let Some(step) = file.steps.iter().find(|step| !is_known(step, &space)) {
+            let StepFile { id, from, to, .. } = step;
+            let problem = format!(
+                "step {id} from state {} to state {}: the abstraction has no such step",
+                from.0, to.0
+            );
+            return Err(FileError::content(&path, problem));
+        }
         let steps = file.steps.into_iter().map(|step| planned_option(step, folder, &space, goal.clone()));
         let steps = steps.collect::<Result<Vec<_>, _>>()?;
         if steps.is_empty() {
@@ -260,6 +268,19 @@ fn step_file(step: &PlannedOption, folder: &Path) -> Result<StepFile, FileError>
         gradient_steps: learnt.gradient_steps,
         reused: *reused,
     })
+}
+
+/// Returns true if the abstraction has what the step names.
+fn is_known(step: &StepFile, space: &OptionSpace) -> bool {
+    let is_endpoint = |index: u32| (index as usize) < space.options.endpoints().len();
+    let is_state = |state: StateId| (state.0 as usize) < space.states.len();
+    let is_leg = match step.id {
+        LegId::First(endpoint) => is_endpoint(endpoint),
+        LegId::Option(id) => space.options.get(id).is_some(),
+        LegId::Last(endpoint, state) => is_endpoint(endpoint) && is_state(state),
+        LegId::Direct => true,
+    };
+    is_leg && is_state(step.from) && is_state(step.to)
 }
 
 fn planned_option(
@@ -354,6 +375,25 @@ mod tests {
         let (other, _) = test_worlds::world(SEALED, OptionKind::Centroid);
         let error = Plan::load(folder.path(), (*other.grid).clone()).unwrap_err().to_string();
         assert!(error.contains("plan.ron") && error.contains("another map"), "{error}");
+    }
+
+    /// Fuzzing found it: a number out of range in a plan whose checksum fits ended the program.
+    #[test]
+    fn a_plan_that_names_what_the_abstraction_lacks_is_refused() {
+        let (plan, folder) = saved(OptionKind::Centroid);
+        let path = folder.path().join(PLAN_FILE);
+        let mut file: PlanFile = files::read_ron(&path).unwrap();
+        let sound = file.steps[0].id;
+        for id in [LegId::First(900), LegId::Last(900, StateId(0)), LegId::Last(0, StateId(900))] {
+            file.steps[0].id = id;
+            files::write_ron(&path, &file).unwrap();
+            let error = Plan::load(folder.path(), (*plan.world.grid).clone()).unwrap_err().to_string();
+            assert!(error.contains("plan.ron: step ") && error.contains("no such step"), "{error}");
+        }
+        (file.steps[0].id, file.steps[0].to) = (sound, StateId(900));
+        files::write_ron(&path, &file).unwrap();
+        let error = Plan::load(folder.path(), (*plan.world.grid).clone()).unwrap_err().to_string();
+        assert!(error.contains("to state 900"), "{error}");
     }
 
     #[test]

@@ -182,8 +182,12 @@ impl RemoteDriver {
         self.pending = Pending::Nothing;
         match self.policy.decide() {
             Decision::Drive(command) => {
-                self.pending = Pending::Command(command);
                 let point = command.to_world(&state.pose);
+                // What is no number moves no robot: simulated ones stop, and others are told to.
+                if ![point.x, point.y, command.speed_mps].iter().all(|number| number.is_finite()) {
+                    return self.instruction(None, 0.0, RemoteStatus::Lost);
+                }
+                self.pending = Pending::Command(command);
                 let towards = point - state.pose.position;
                 let heading = Heading::new(trig::atan2(towards.y, towards.x));
                 self.instruction(Some(Pose::at(point, heading)), command.speed_mps, self.status())
@@ -214,6 +218,7 @@ impl RemoteDriver {
 
 #[cfg(test)]
 mod tests {
+    use sharp_drive::{OptionPolicy, Policy, Situation};
     use sharp_guide::Departure;
     use sharp_options::OptionKind;
 
@@ -239,6 +244,27 @@ mod tests {
         let behind = answers[1].waypoint.expect("a place behind it");
         assert!((behind.position.x - 0.7).abs() < 1e-9, "so much is left: {behind:?}");
         assert!(answers.iter().all(|answer| answer.status == RemoteStatus::Running), "as planned");
+    }
+
+    /// Fuzzing found it: with a number in a plan's file changed, the robot was sent to no place at all.
+    #[test]
+    fn a_policy_that_decides_no_number_stops_the_robot() {
+        #[derive(Clone, Debug)]
+        struct Nowhere(f64);
+        impl Policy for Nowhere {
+            fn decide(&mut self, _: &Situation<'_>) -> Command {
+                Command { reach_m: self.0, bearing_rad: 0.0, speed_mps: 0.5 }
+            }
+        }
+        for reach_m in [f64::NAN, f64::INFINITY, 1e308] {
+            let mut plan = (*plan(OptionKind::Centroid)).clone();
+            plan.solution.steps[0].learnt.policy = OptionPolicy::Custom(Box::new(Nowhere(reach_m)));
+            let answer = RemoteDriver::new(vec![Arc::new(plan)], &at(1.0, 2.2), true).answer(&at(1.0, 2.2));
+            let is_place = answer.waypoint.is_none_or(|at| at.is_finite());
+            assert!(is_place && answer.speed_mps.is_finite(), "{reach_m}: {answer:?}");
+            let is_lost = answer.waypoint.is_none() && answer.status == RemoteStatus::Lost;
+            assert!(is_lost || reach_m == 1e308, "{reach_m}: {answer:?}");
+        }
     }
 
     #[test]

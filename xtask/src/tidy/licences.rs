@@ -1,6 +1,6 @@
-//! The licences of all dependencies, and packages that must not come back.
+//! The licences of all dependencies, packages that must not come back, and packages in several versions.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::Stdio;
 
 use anyhow::{Context, ensure};
@@ -27,10 +27,14 @@ const ALLOWED: [&str; 13] = [
 ];
 
 /// Packages kept out, each with the reason.
-const BANNED: [(&str, &str); 3] = [
+const BANNED: [(&str, &str); 7] = [
     ("bincode", "is unmaintained (RUSTSEC-2025-0141)"),
     ("serde_yaml", "is deprecated, serde-saphyr reads YAML here"),
     ("fs2", "is abandoned, std locks files"),
+    ("curl", "opens connections, nothing here does"),
+    ("hyper", "opens connections, nothing here does"),
+    ("reqwest", "opens connections, nothing here does"),
+    ("ureq", "opens connections, nothing here does"),
 ];
 
 /// Packages whose licence is not on the list but whose terms are met.
@@ -39,10 +43,26 @@ const EXCEPTIONS: [(&str, &str); 1] = [
     ("colored", "MPL-2.0"),
 ];
 
+/// Packages that a build contains in several versions, because those who need them do not agree: the most there may be.
+const REPEATED: [(&str, usize); 6] = [
+    // burn's macros.
+    ("darling", 2),
+    ("darling_core", 2),
+    ("darling_macro", 2),
+    ("foldhash", 2),
+    ("hashbrown", 3),
+    // PNG writers of resvg and image.
+    ("miniz_oxide", 2),
+];
+
+/// Compiles macros only, and changes its version more often than its users do.
+const REPEATED_MACROS: &str = "syn";
+
 /// A package that a build for this machine contains.
 #[derive(Debug, PartialEq)]
 pub(super) struct LicensedPackage {
     name: String,
+    version: String,
     licence: String,
 }
 
@@ -63,7 +83,8 @@ fn parse(tree: &str) -> Vec<LicensedPackage> {
     let lines: BTreeSet<&str> = tree.lines().map(|line| line.trim_end_matches(" (*)")).collect();
     let packages = lines.iter().filter_map(|line| {
         let (package, licence) = line.split_once('\t')?;
-        Some(LicensedPackage { name: package.split(' ').next()?.to_owned(), licence: licence.to_owned() })
+        let mut words = package.split(' ').map(str::to_owned);
+        Some(LicensedPackage { name: words.next()?, version: words.next()?, licence: licence.to_owned() })
     });
     packages.collect()
 }
@@ -71,7 +92,7 @@ fn parse(tree: &str) -> Vec<LicensedPackage> {
 /// Checks every package against the lists above.
 pub(super) fn check(dependencies: &[LicensedPackage]) -> Vec<Finding> {
     let mut problems = Vec::new();
-    for LicensedPackage { name, licence } in dependencies {
+    for LicensedPackage { name, licence, .. } in dependencies {
         let is_exception = EXCEPTIONS.contains(&(name.as_str(), licence.as_str()));
         if !is_exception && !Expression(licence).is_allowed() {
             let message = format!("package {name} has the licence {licence:?}, which is not on the list");
@@ -81,7 +102,25 @@ pub(super) fn check(dependencies: &[LicensedPackage]) -> Vec<Finding> {
             problems.push(Finding::new("Cargo.lock", 1, format!("package {name} {reason}")));
         }
     }
+    problems.extend(repeated(dependencies));
     problems
+}
+
+/// A problem for each package in more versions than are known and explained above.
+fn repeated(dependencies: &[LicensedPackage]) -> Vec<Finding> {
+    let mut versions: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for LicensedPackage { name, version, .. } in dependencies {
+        versions.entry(name).or_default().insert(version);
+    }
+    let most = |name: &str| REPEATED.iter().find(|(known, _)| *known == name).map_or(1, |(_, most)| *most);
+    let repeated = versions
+        .into_iter()
+        .filter(|(name, versions)| *name != REPEATED_MACROS && versions.len() > most(name))
+        .map(|(name, versions)| {
+            let versions = versions.into_iter().collect::<Vec<_>>().join(", ");
+            Finding::new("Cargo.lock", 1, format!("package {name} is built in versions {versions}"))
+        });
+    repeated.collect()
 }
 
 /// An SPDX expression such as `(MIT OR Apache-2.0) AND Unicode-3.0`; old manifests write `MIT/Apache-2.0`.
@@ -159,9 +198,23 @@ mod tests {
         assert_eq!(names, expected.map(|(name, licence)| (name.to_owned(), licence.to_owned())));
     }
 
+    fn package(name: &str, version: &str) -> LicensedPackage {
+        LicensedPackage { name: name.into(), version: version.into(), licence: "MIT".into() }
+    }
+
+    #[test]
+    fn packages_in_more_versions_than_are_explained_are_named() {
+        let twice = |name| [package(name, "v1.0.0"), package(name, "v2.0.0"), package(name, "v2.0.0")];
+        assert!(check(&twice("darling")).is_empty() && check(&twice("syn")).is_empty(), "these are known");
+        let problems = check(&twice("serde"));
+        assert_eq!(problems.len(), 1, "{problems:?}");
+        assert_eq!(problems[0].message, "package serde is built in versions v1.0.0, v2.0.0");
+        assert!(check(&[package("serde", "v1.0.0")]).is_empty(), "one version");
+    }
+
     #[test]
     fn banned_packages_are_named_with_the_reason() {
-        let dependencies = [LicensedPackage { name: "bincode".into(), licence: "MIT".into() }];
+        let dependencies = [package("bincode", "v1.3.3")];
         let problems = check(&dependencies);
         assert_eq!(problems[0].message, "package bincode is unmaintained (RUSTSEC-2025-0141)");
     }

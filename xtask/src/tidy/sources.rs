@@ -16,6 +16,12 @@ const UNFINISHED: [&str; 5] = [
 const PRINTING: [&str; 4] =
     [concat!("print", "ln!("), concat!("eprint", "ln!("), concat!("pri", "nt!("), concat!("epri", "nt!(")];
 
+/// What opens connections: the project works without a network.
+const CONNECTING: [&str; 1] = [concat!("std:", ":net")];
+
+/// Workspaces of their own, whose manifests differ.
+const STRANGERS: [&str; 2] = ["tests/downstream/", "tests/fuzz/"];
+
 /// How a manifest begins its licence if it holds files of others besides ours.
 const EXTENDED_LICENCE: &str = "\nlicense = \"(MIT OR Apache-2.0) AND ";
 
@@ -29,15 +35,17 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
         if is_library(path) {
             problems.extend(find(path, library_code(text), &PRINTING, "library code must not print"));
         }
+        if path.starts_with("crates/") {
+            problems.extend(find(path, text, &CONNECTING, "nothing here uses a network"));
+        }
     }
     for ending in [".rs", ".md", ".toml"] {
         for (path, text) in tree.matching("", ending) {
             problems.extend(find(path, text, &UNFINISHED, "unfinished work belongs in an issue"));
         }
     }
-    // Projects of strangers have manifests of their own.
-    let manifests =
-        tree.matching("", "/Cargo.toml").filter(|(path, _)| !path.starts_with("tests/downstream/"));
+    let is_stranger = |path: &str| STRANGERS.iter().any(|folder| path.starts_with(folder));
+    let manifests = tree.matching("", "/Cargo.toml").filter(|(path, _)| !is_stranger(path));
     for (path, text) in manifests {
         for line in ["[lints]\nworkspace = true", "license.workspace = true"] {
             // A crate with files of others in it adds their terms to ours.
@@ -47,6 +55,11 @@ pub(super) fn check(tree: &Tree) -> Vec<Finding> {
                 problems.push(Finding::new(path, 1, message));
             }
         }
+    }
+    if let Some(text) = tree.files.get("Cargo.toml").filter(|text| !text.contains("unsafe_code = \"forbid\""))
+    {
+        let line = text.lines().count();
+        problems.push(Finding::new("Cargo.toml", line, "must forbid unsafe code in every package"));
     }
     problems
 }
@@ -134,6 +147,10 @@ mod tests {
         let extended = "\nlicense = \"(MIT OR Apache-2.0) AND OFL-1.1\"\n[lints]\nworkspace = true\n";
         assert!(problems("crates/a/Cargo.toml", extended).is_empty(), "with the terms of a font");
         assert_eq!(problems("crates/a/Cargo.toml", "").len(), 2, "both missing");
-        assert!(problems("Cargo.toml", "").is_empty(), "the workspace's own manifest");
+        assert!(
+            problems("Cargo.toml", "unsafe_code = \"forbid\"").is_empty(),
+            "the workspace's own manifest"
+        );
+        assert_eq!(problems("Cargo.toml", "").len(), 1, "it forbids unsafe code");
     }
 }

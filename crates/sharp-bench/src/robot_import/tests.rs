@@ -10,12 +10,8 @@ fn import(files: &[(&str, &str)], wishes: &ImportWishes) -> Result<ImportedRobot
     }
     let imported = import_robot(&paths, wishes)?;
     let again = RobotModel::from_ron(&imported.text).unwrap_or_else(|e| panic!("{e} in\n{}", imported.text));
-    assert_eq!(
-        again.footprint, imported.robot.footprint,
-        "what is written is what was made\n{}",
-        imported.text
-    );
-    assert_eq!(again.drive, imported.robot.drive, "{}", imported.text);
+    // Fuzzing found it: numbers are rounded in the file, and the robot had more digits.
+    assert_eq!(again, imported.robot, "what is written is what was made\n{}", imported.text);
     Ok(imported)
 }
 

@@ -63,11 +63,14 @@ pub(super) fn robot(name: &str, files: &[PathBuf], mut facts: Facts) -> Result<I
         numbers.push("yaw_inertia_kgm2");
         complete(&parts)
     });
-    let robot = robot.map_err(|source| ImportError::Robot { files: listed(files), source })?;
+    let refused = |source| ImportError::Robot { files: listed(files), source };
+    let robot = robot.map_err(refused)?;
     for (field, _, why) in NUMBERS.iter().filter(|(field, ..)| numbers.contains(field)) {
         parts.assumed(field, number_text(value_of(&robot, field)), why);
     }
     let text = parts.text(name, files);
+    // As whoever reads the file gets it: numbers are rounded there.
+    let robot = RobotModel::from_ron_named(&text, name).map_err(refused)?;
     let (assumed, found): (Vec<_>, Vec<_>) = parts.fields.into_iter().partition(|field| field.assumed);
     let finding =
         |field: Field| ImportedField { field: field.field, value: field.value, source: field.source };

@@ -7,7 +7,6 @@ pub(crate) mod export;
 pub(crate) mod jobs;
 pub(crate) mod learn;
 pub(crate) mod library;
-mod lines;
 pub(crate) mod man;
 pub(crate) mod map;
 pub(crate) mod prior;

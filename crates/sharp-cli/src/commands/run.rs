@@ -1,12 +1,13 @@
 //! `sharp run`: executes a plan in a simulator and counts.
 
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 
-use sharp_bench::{PlanPage, RunReport, clock_us, named, pictures};
+use sharp_bench::{BenchError, PlanPage, RunReport, clock_us, named, pictures};
 use sharp_export::driven_mcap;
 use sharp_maps::{LoadOptions, load};
-use sharp_plan::{Execution, Plan, Tour, write_atomic};
+use sharp_plan::{Execution, FileError, Plan, Tour, write_atomic};
 use sharp_space::Seed;
 
 use crate::args::{Collisions, Run, Switch};
@@ -51,8 +52,7 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
     spinner.finish_and_clear();
     let report = RunReport::predicted(tour.predicted, &episodes);
     let picture = pictures::tour(&tour, &episodes);
-    pictures::write(&args.plan_dir, "run", &picture)?;
-    write_atomic(&args.plan_dir.join("run.json"), (to_json(&report) + "\n").as_bytes())?;
+    let has_picture = keep(&args.plan_dir, &picture, &report)?;
     if json {
         say!("{}", to_json(&report));
     } else {
@@ -76,9 +76,27 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
             report.decision_us.p50,
             report.decision_us.p99
         );
-        say!("picture: {}", args.plan_dir.join("run.png").display());
+        if has_picture {
+            say!("picture: {}", args.plan_dir.join("run.png").display());
+        }
     }
     Ok(Exit::Done)
+}
+
+/// Keeps picture and report in the plan's `folder`. It may lie where nothing can be written: its owner has seen the
+/// report all the same. Returns true if they are kept.
+fn keep(folder: &Path, picture: &str, report: &RunReport) -> Result<bool, Failure> {
+    let kept = pictures::write(folder, "run", picture)
+        .and_then(|()| Ok(write_atomic(&folder.join("run.json"), (to_json(report) + "\n").as_bytes())?));
+    match kept {
+        Err(BenchError::File(FileError::Io { path, source }))
+            if matches!(source.kind(), ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied) =>
+        {
+            eprintln!("warning: {}: {source}; picture and report are not kept", path.display());
+            Ok(false)
+        }
+        kept => Ok(kept.map(|()| true)?),
+    }
 }
 
 /// The name of the map that the plan in `folder` was made for, as its report says; else the folder's own.
