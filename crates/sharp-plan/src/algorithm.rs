@@ -29,6 +29,9 @@ const ATTEMPTS_MAX: usize = 24;
 const VERIFIED_MAX: usize = 4;
 /// The same where odds are composed.
 const COMPOSED_MAX: usize = 2;
+/// Composed plans that succeed less often than this are compared with the direct way: it takes half of the time of an
+/// answer to guide and to drive, and is seldom better where options do well.
+const COMPOSED_WELL: f64 = 0.98;
 
 /// How solving ended.
 #[derive(Debug)]
@@ -95,6 +98,7 @@ fn algorithm_1(
         Err(unplaced) => return Ok(Outcome::NoPlan(describe(problem, &unplaced.to_string()))),
     };
     let mut policies = Policies::new(library);
+    let mut most = if method.verify_episodes == 0 { COMPOSED_MAX } else { VERIFIED_MAX };
     let (mut best, mut verified): (Option<Solution>, usize) = (None, 0);
     for _ in 0..ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
@@ -136,9 +140,8 @@ fn algorithm_1(
             false => verify(problem, &p, &policies),
         };
         verified += 1;
-        // Answers at once leave the direct way, which takes long to guide and to drive, for where there is no other.
-        if !is_composed {
-            search.offer_direct();
+        if !is_composed || solution.composed.as_ref().is_some_and(|odds| odds.success < COMPOSED_WELL) {
+            most += usize::from(search.offer_direct() && is_composed);
         }
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
         let cost_s = |solution: &Solution| solution.cost_s(method.failure_cost_s);
@@ -147,7 +150,7 @@ fn algorithm_1(
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
         if is_stopped
-            || verified == if is_composed { COMPOSED_MAX } else { VERIFIED_MAX }
+            || verified == most
             || best_s <= method.retry_above * other_s(&mut search, &policies)
         {
             break;
