@@ -222,8 +222,12 @@ impl Solved {
         plan.save(folder, file)?;
         let grid = &plan.world.grid;
         sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
-        pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction))?;
-        pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[]))?;
+        // They take as long as the answer.
+        let (of_states, of_plan) = rayon::join(
+            || pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction)),
+            || pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[])),
+        );
+        of_states.and(of_plan)?;
         write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;
         Ok(())
     }

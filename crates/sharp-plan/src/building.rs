@@ -146,6 +146,12 @@ pub struct BuildingTask<'a> {
     pub monitor: &'a dyn BuildingMonitor,
 }
 
+impl std::fmt::Debug for BuildingTask<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("BuildingTask").field("share", &self.share).finish_non_exhaustive()
+    }
+}
+
 impl BuildingTask<'_> {
     /// Learns the options of this part that `library` lacks.
     ///

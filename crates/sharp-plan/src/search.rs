@@ -39,8 +39,10 @@ const STATE_NEAR_M: f64 = 0.5;
 const EXPANSIONS: usize = 100_000;
 /// The same for each way out of a tight start.
 const EXPANSIONS_DEPARTING: usize = 5_000;
-/// Episodes in which each way out of a tight start is tried.
-const TRIAL_EPISODES: u32 = 200;
+/// Episodes in which each way out of a tight start is tried; the second where an answer is wanted at once.
+const TRIAL_EPISODES: [u32; 2] = [200, 32];
+/// There, metres of a leg that are driven after the robot has left.
+const TRIAL_M: f64 = 2.5;
 /// A leg from the start whose guide succeeds less often than this, by its price, looks for a better way to begin.
 const LEAVES_WELL: f64 = 0.98;
 
@@ -62,6 +64,10 @@ pub struct Search<'a> {
     departures: OnceLock<Vec<(Departure, Vec<Pose>)>>,
     /// Under what they are tried; by their prices alone without.
     trials: Option<&'a Conditions>,
+    /// Whether an answer is wanted at once: then they are tried for the first leg that is asked for, until one does well.
+    is_hurried: bool,
+    /// Which of them it was then; `None` for driving at once.
+    chosen: OnceLock<Option<usize>>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Options that are at hand from the beginning, the same for every search of a building.
@@ -69,6 +75,13 @@ pub struct Search<'a> {
     /// Seconds that hand-overs cost beyond their turn, because they were seen to fail.
     charges: BTreeMap<(LegId, LegId), f64>,
     seed: Seed,
+}
+
+/// What trying a way out of the start showed.
+struct Trial {
+    /// What the leg costs, seconds.
+    cost_s: f64,
+    failures: u32,
 }
 
 /// Why there is no search for a query: no abstract state at one of its ends.
@@ -118,6 +131,8 @@ impl<'a> Search<'a> {
             prices: BTreeMap::new(),
             departures: OnceLock::new(),
             trials: None,
+            is_hurried: false,
+            chosen: OnceLock::new(),
             offers_direct: false,
             known: None,
             charges: BTreeMap::new(),
@@ -318,11 +333,19 @@ impl<'a> Search<'a> {
         if !matches!(id, LegId::First(_) | LegId::Direct) {
             return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
         }
+        let again = self.chosen.get().copied().flatten().and_then(|way| self.departures().get(way));
+        if let Some(option) = again.and_then(|way| self.departing(candidate, way)) {
+            return Ok(Arc::new(option));
+        }
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
         let is_tight = is_tight(&self.world.guide_robot(), self.query.start);
         let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
-        if !self.settings.departures || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
+        let is_settled = at_once.is_ok() && self.chosen.get().is_some();
+        if !self.settings.departures || is_settled || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
+        }
+        if self.is_hurried {
+            return self.first_that_leaves(candidate, at_once);
         }
         // A price knows little of tight places; elsewhere only what seems better than to drive at once is tried.
         let priced_s = |option: &GuidedOption| self.pricer.cost_s(&self.pricer.price(option, None), None);
@@ -335,36 +358,80 @@ impl<'a> Search<'a> {
         }
         ways.extend(at_once);
         let options = ways.into_iter().map(Arc::new);
-        let tried = options.map(|option| (self.trial_cost_s(&option), option));
-        let (_, option) = tried.min_by(|a, b| a.0.total_cmp(&b.0)).expect("there is a way");
+        let tried = options.map(|option| (self.trial(&option), option));
+        let cost_s = |tried: &(Trial, Arc<GuidedOption>)| tried.0.cost_s;
+        let (_, option) = tried.min_by(|a, b| cost_s(a).total_cmp(&cost_s(b))).expect("there is a way");
         Ok(option)
     }
 
-    /// What the leg `option` costs from the start, seconds: by a few episodes of the prior where there is a simulator, for
-    /// a price knows little of tight places.
-    fn trial_cost_s(&self, option: &Arc<GuidedOption>) -> f64 {
+    /// The leg `candidate` with the first way out of the start that leaves it every time, driving `at_once` before all
+    /// others; the cheapest if each fails at times. The next legs from the start leave it likewise.
+    fn first_that_leaves(
+        &self,
+        candidate: &Candidate,
+        at_once: Result<GuidedOption, NoGuide>,
+    ) -> Result<Arc<GuidedOption>, NoGuide> {
+        let departing =
+            |(number, way)| Some((Some(number), Arc::new(self.departing(candidate, way)?)));
+        let begin = at_once.as_ref().ok().map(|option| (None, Arc::new(option.clone())));
+        let ways = begin.into_iter().chain(self.departures().iter().enumerate().filter_map(departing));
+        let mut best: Option<(f64, Option<usize>, Arc<GuidedOption>)> = None;
+        for (number, option) in ways {
+            let Trial { cost_s, failures } = self.trial(&option);
+            if failures == 0 || best.as_ref().is_none_or(|best| cost_s < best.0) {
+                best = Some((cost_s, number, option));
+            }
+            if failures == 0 {
+                break;
+            }
+        }
+        let Some((_, number, option)) = best else { return at_once.map(Arc::new) };
+        // Of a plan only one leg begins at the start, so that this is the same every time.
+        let _ = self.chosen.set(number);
+        Ok(option)
+    }
+
+    /// What the leg `option` costs from the start: by a few episodes of the prior where there is a simulator, for a price
+    /// knows little of tight places.
+    fn trial(&self, option: &Arc<GuidedOption>) -> Trial {
         let price = self.pricer.price(option, None);
         let measured = self.trials.map(|conditions| {
             let policy = self.pricer.policy();
             let states = InitialStates::exactly(RobotState::at_rest(self.query.start));
             let seed = self.seed.child(&format!("leave {}", option.id), 0);
-            let trial = conditions.monte_carlo(self.world).with_episodes(TRIAL_EPISODES).with_seed(seed);
-            trial.estimate(&[Driver::new(option, &policy, None)], &states)
+            let episodes = TRIAL_EPISODES[usize::from(self.is_hurried)];
+            let trial = conditions.monte_carlo(self.world).with_episodes(episodes).with_seed(seed);
+            let mut driver = Driver::new(option, &policy, None);
+            if !self.is_hurried {
+                return trial.estimate(&[driver], &states);
+            }
+            driver.link.until_m = option.departure.careful_m + TRIAL_M;
+            // What a part of the leg takes says nothing of the time of the whole.
+            SuccessEstimate { mean_time_s: f64::INFINITY, ..trial.estimate(&[driver], &states) }
         });
-        self.pricer.cost_s(&price, measured.as_ref())
+        let failures = measured.map_or(0, |measured| measured.count.failures());
+        Trial { cost_s: self.pricer.cost_s(&price, measured.as_ref()), failures }
     }
 
-    /// From now on ways out of a tight start are tried under `conditions` before one is taken.
+    /// From now on ways out of a tight start are tried under `conditions` before one is taken: all of them for each leg, or,
+    /// in a hurry, for one leg until one does well.
     #[must_use]
-    pub(crate) fn with_trials(self, conditions: &'a Conditions) -> Self {
-        Self { trials: Some(conditions), ..self }
+    pub(crate) fn with_trials(self, conditions: &'a Conditions, is_hurried: bool) -> Self {
+        Self { trials: Some(conditions), is_hurried, ..self }
     }
 
     /// The ways out of the start, where it is a tight place.
     fn departures(&self) -> &[(Departure, Vec<Pose>)] {
         self.departures.get_or_init(|| {
             let robot = &self.world.robot;
-            departures(&self.world.guide_robot(), self.query.start, robot.recovery_reverse_m)
+            let mut ways = departures(&self.world.guide_robot(), self.query.start, robot.recovery_reverse_m);
+            if self.is_hurried {
+                // The first that does well is taken: backing off is quick, a curve that is driven with care is not.
+                ways.sort_by(|(a, _), (b, _)| {
+                    a.careful_m.total_cmp(&b.careful_m).then(a.back_off_m.total_cmp(&b.back_off_m))
+                });
+            }
+            ways
         })
     }
 

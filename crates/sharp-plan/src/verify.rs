@@ -131,6 +131,16 @@ pub(crate) fn predict(
 ) -> Solution {
     let odds = compose(problem, plan, policies, known);
     note_ends(plan, policies, &odds);
+    composed(problem, plan, policies, odds)
+}
+
+/// `plan` with its `odds`.
+pub(crate) fn composed(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+    odds: ComposedOdds,
+) -> Solution {
     let PlanningProblem { world, conditions, method, .. } = *problem;
     let pricer = Pricer::new(world, &conditions.noise, method.search, method.failure_cost_s);
     let planned = |(index, option): (usize, &Arc<GuidedOption>)| {
