@@ -229,8 +229,7 @@ fn compare(
 
 /// How often `plan` succeeds as it is executed, and how long that takes, seconds.
 fn executed(plan: &Arc<Plan>, seed: Seed) -> (SuccessCount, f64) {
-    let executions =
-        run(plan, &RunSettings::new(plan, EXECUTIONS, seed.child("executions", 0)), &|| 0.0);
+    let executions = run(plan, &RunSettings::new(plan, EXECUTIONS, seed.child("executions", 0)), &|| 0.0);
     let reached = executions.iter().filter(|one| one.end == sharp_drive::EpisodeEnd::Reached);
     let times: Vec<f64> = reached.map(|one| one.record.time_s).collect();
     (success(&executions), times.iter().sum::<f64>() / times.len().max(1) as f64)

@@ -8,8 +8,8 @@ use serde::Serialize;
 use sharp_drive::World;
 use sharp_maps::MapFile;
 use sharp_plan::{
-    AbstractionFile, Area, BuildingMonitor, BuildingShare, BuildingWork, MeasuredStretch, Part, Roster, Sharp,
-    WeakPlace, measured_stretches, weak_places,
+    AbstractionFile, Area, BuildingMonitor, BuildingShare, BuildingWork, MeasuredStretch, Part, Roster,
+    Sharp, WeakPlace, measured_stretches, weak_places,
 };
 use sharp_sim::NoiseModel;
 use sharp_space::{Cell, GridFrame, Point, Seed};
@@ -207,7 +207,8 @@ pub fn learn_by(
             return learn(place, settings, library, nothing, &());
         }
     }
-    let learnt = learn(place, settings, library, BuildingShare { within, ..BuildingShare::ALL }, monitor.building())?;
+    let learnt =
+        learn(place, settings, library, BuildingShare { within, ..BuildingShare::ALL }, monitor.building())?;
     // A folder that stays is found finished by the next call.
     let _ = fs::remove_dir_all(&dir);
     Ok(learnt)

@@ -249,16 +249,14 @@ fn a_building_learnt_on_a_cluster_that_loses_a_task_has_the_bytes_of_one_process
         Err(missing) => return println!("skipped: {missing}"),
     };
     let folder = cluster.root.path().to_owned();
-    let building = ["learn", "a", "--options", "centroid", "--within", "7.5,0,15,7.5", "--library"];
+    let building = ["learn", "a", "--options", "centroid", "--within", "0,0,15,8", "--library"];
     let on_cluster = [&building[..], &["slurm", "--engine", "slurm", "--jobs", "3"]].concat();
     let mut learner = cluster.command(env!("CARGO_BIN_EXE_sharp"), &on_cluster);
     let learner = learner.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the binary runs");
     let first_round = cluster.payload(1, &[]);
-    sleep(Duration::from_millis(300));
-    // It may be over already: a lesson on options is short.
+    // It may be over already: these lessons are short.
     let _ = Command::new("kill").args(["-KILL", &first_round.to_string()]).status();
     let second_round = cluster.payload(4, &[first_round]);
-    sleep(Duration::from_millis(700));
     let _ = Command::new("kill").args(["-KILL", &second_round.to_string()]).status();
     let learner = learner.wait_with_output().expect("a child");
     assert_eq!(learner.status.code(), Some(0), "{learner:?}");
@@ -267,7 +265,7 @@ fn a_building_learnt_on_a_cluster_that_loses_a_task_has_the_bytes_of_one_process
     assert_eq!(here.status.code(), Some(0), "{here:?}");
     let threads = cluster.sharp(&[&building[..], &["threads", "--jobs", "2"]].concat());
     assert_eq!(threads.status.code(), Some(0), "{threads:?}");
-    let names = |folder: &str| tree(&cluster.root.path().join(folder)).into_iter().map(|file| file.0).collect::<Vec<_>>();
+    let names = |name: &str| tree(&folder.join(name)).into_iter().map(|file| file.0).collect::<Vec<_>>();
     assert_eq!(names("slurm"), names("local"));
     for other in ["slurm", "threads"] {
         assert!(tree(&folder.join(other)) == tree(&folder.join("local")), "{other} and one process");

@@ -154,10 +154,7 @@ fn algorithm_1(
             chosen.clone_from(&p);
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
-        if is_stopped
-            || verified == most
-            || best_s <= method.retry_above * other_s(&mut search, &policies)
-        {
+        if is_stopped || verified == most || best_s <= method.retry_above * other_s(&mut search, &policies) {
             break;
         }
     }

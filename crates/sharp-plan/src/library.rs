@@ -199,7 +199,9 @@ impl OptionLibrary {
         let after = read_intents(&folder)?;
         let left_behind: Vec<PathBuf> = after.iter().map(|(path, _)| path.clone()).collect();
         let unfinished = after.iter().flat_map(|(_, options)| options).map(|file| file.id).collect();
-        files.extend(before.into_iter().chain(after).flat_map(|(_, options)| options).map(|file| (file.id, file)));
+        files.extend(
+            before.into_iter().chain(after).flat_map(|(_, options)| options).map(|file| (file.id, file)),
+        );
         let mut networks = Networks::new();
         let load = |(id, file)| Ok((id, load_option(file, &folder, &mut networks)?));
         let options = files.into_iter().map(load).collect::<Result<_, FileError>>()?;
@@ -262,7 +264,8 @@ impl OptionLibrary {
     /// # Errors
     /// Returns an error that names the file that could not be written; what is not on disk stays unsaved.
     pub fn save(&mut self) -> Result<(), FileError> {
-        let unsaved: BTreeSet<OptionId> = self.unsaved.iter().flatten().chain(&self.unfinished).copied().collect();
+        let unsaved: BTreeSet<OptionId> =
+            self.unsaved.iter().flatten().chain(&self.unfinished).copied().collect();
         if let (Some(folder), true) = (&self.folder, unsaved.len() > 1 || !self.left_behind.is_empty()) {
             let files = unsaved.iter().map(|&id| option_file(id, &self.options[&id], folder));
             let intent = IntentFile { format: FORMAT, options: files.collect::<Result<_, _>>()? };

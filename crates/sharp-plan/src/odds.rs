@@ -22,8 +22,8 @@ use crate::problem::PlanningProblem;
 
 /// Runs of a piece that no library has: so many, and where its price or they leave doubts so many more.
 const EPISODES: [u32; 2] = [32, 16];
-/// Where one of these fails, so many more of the plan that is taken.
-const EPISODES_MORE: u32 = 192;
+/// So many more of the plan that is taken where none of these failed, and where one did.
+const EPISODES_MORE: [u32; 2] = [32, 192];
 /// Success by the price from which on the few first runs are enough, and runs that the cost model's word counts as beside runs
 /// none of which failed. Of 218 pieces with such a price whose first 16 runs came through, 1,000 runs of each showed 0.997 on
 /// average, as the price says, and less than 0.98 for one in forty. Of 55 with a price from 0.985 on it was less than 0.93 for
@@ -66,6 +66,15 @@ pub struct PlanPiece {
     pub episodes: f64,
     /// Mean time, seconds.
     pub time_s: f64,
+    /// Runs that were made for this plan alone; 0 where a library knew.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub runs: u32,
+}
+
+/// Serde asks with a reference.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks with a reference")]
+const fn is_none(runs: &u32) -> bool {
+    *runs == 0
 }
 
 impl ComposedOdds {
@@ -140,6 +149,7 @@ pub(crate) fn compose(
                 success: count.rate(),
                 episodes: f64::from(count.episodes),
                 time_s: *mean_time_s,
+                runs: 0,
             },
             _ => end_piece(problem, plan, policies, (from, to)),
         }
@@ -158,27 +168,38 @@ fn cuts(plan: &[Arc<GuidedOption>]) -> Vec<(Option<usize>, usize)> {
     std::iter::once((None, first)).chain(between).chain([(Some(last), whole)]).collect()
 }
 
-/// The `odds` of `plan` with more runs of those pieces of which a few of few failed: for the plan that is taken.
+/// The `odds` of `plan` with more runs of those pieces that no library has: for the plan that is taken.
 pub(crate) fn refine(
     problem: &PlanningProblem<'_>,
     plan: &[Arc<GuidedOption>],
     policies: &Policies<'_>,
     odds: &ComposedOdds,
 ) -> ComposedOdds {
-    let few = f64::from(EPISODES[0] + EPISODES[1]);
-    let refined = |(piece, &ends): (&PlanPiece, &(Option<usize>, usize))| {
-        // What a library knows was counted on more runs, but for cuts that hardly anybody came to.
-        if piece.success == 1.0 || piece.episodes > few {
+    let refined = |(piece, ends): (&PlanPiece, (Option<usize>, usize))| {
+        if piece.runs == 0 {
             return *piece;
         }
         let stretch = OwnStretch::new(problem, plan, policies, ends);
-        let more = stretch.drive(EPISODES_MORE, "more");
-        let mean_time_s = if piece.success > 0.0 { piece.time_s } else { f64::INFINITY };
-        let both = more.and(&SuccessEstimate { count: piece.count(), mean_time_s });
-        let time_s = if both.count.successes >= TIMED_MIN { both.mean_time_s } else { piece.time_s };
-        PlanPiece { success: both.count.rate(), episodes: f64::from(both.count.episodes), time_s, ..*piece }
+        let runs = f64::from(piece.runs);
+        // What the price said, and how much it counted: nothing where a run failed.
+        let weight = piece.episodes - runs;
+        let price = if weight > 0.0 { (piece.success * piece.episodes - runs) / weight } else { 0.0 };
+        let count = nearest_count(if weight > 0.0 { 1.0 } else { piece.success }, runs);
+        let mean_time_s = if count.successes > 0 { piece.time_s } else { f64::INFINITY };
+        let mut all = SuccessEstimate { count, mean_time_s };
+        if weight > 0.0 {
+            all = stretch.drive(EPISODES_MORE[0], "again").and(&all);
+        }
+        let weight = if all.count.failures() == 0 { weight } else { 0.0 };
+        if weight == 0.0 {
+            all = stretch.drive(EPISODES_MORE[1], "more").and(&all);
+        }
+        let episodes = weight + f64::from(all.count.episodes);
+        let success = weight.mul_add(price, f64::from(all.count.successes)) / episodes;
+        let time_s = if all.count.successes >= TIMED_MIN { all.mean_time_s } else { piece.time_s };
+        PlanPiece { success, episodes, time_s, runs: all.count.episodes, ..*piece }
     };
-    ComposedOdds::of(odds.pieces.iter().zip(&cuts(plan)).map(refined).collect())
+    ComposedOdds::of(odds.pieces.par_iter().zip(cuts(plan)).map(refined).collect())
 }
 
 /// The option in whose middle a robot has left the first leg some metres behind, so that it does not matter any more.
@@ -210,7 +231,7 @@ fn end_piece(
     let success = (weight * success + f64::from(count.successes)) / episodes;
     let time_s = if count.successes >= TIMED_MIN { mean_time_s } else { priced_s };
     let until = if to < plan.len() { to as f64 + 0.5 } else { to as f64 };
-    PlanPiece { until, success, episodes, time_s }
+    PlanPiece { until, success, episodes, time_s, runs: count.episodes }
 }
 
 /// Drives a piece of `plan`, a few times only if its price is trusted and none of them fails.
@@ -320,7 +341,7 @@ mod tests {
     use super::*;
 
     fn piece(success: f64, episodes: f64) -> PlanPiece {
-        PlanPiece { until: 1.0, success, episodes, time_s: 5.0 }
+        PlanPiece { until: 1.0, success, episodes, time_s: 5.0, runs: 0 }
     }
 
     #[test]

@@ -371,8 +371,7 @@ impl<'a> Search<'a> {
         candidate: &Candidate,
         at_once: Result<GuidedOption, NoGuide>,
     ) -> Result<Arc<GuidedOption>, NoGuide> {
-        let departing =
-            |(number, way)| Some((Some(number), Arc::new(self.departing(candidate, way)?)));
+        let departing = |(number, way)| Some((Some(number), Arc::new(self.departing(candidate, way)?)));
         let begin = at_once.as_ref().ok().map(|option| (None, Arc::new(option.clone())));
         let ways = begin.into_iter().chain(self.departures().iter().enumerate().filter_map(departing));
         let mut best: Option<(f64, Option<usize>, Arc<GuidedOption>)> = None;

@@ -130,7 +130,8 @@ impl Lesson {
     #[must_use]
     pub fn all(&self) -> Vec<Self> {
         let count = self.part[1];
-        let of_round = |round| (0..count).map(move |index| Self { round, part: [index, count], ..self.clone() });
+        let of_round =
+            |round| (0..count).map(move |index| Self { round, part: [index, count], ..self.clone() });
         [LessonRound::Options, LessonRound::HandOvers].into_iter().flat_map(of_round).collect()
     }
 
@@ -213,7 +214,8 @@ pub(super) fn run_lesson(
     map.name.clone_from(&lesson.map);
     lesson.check(&map)?;
     let place = NamedWorld::new(&map, &lesson.robot, &lesson.noise)?;
-    let within = lesson.within.map(|[x0, y0, x1, y1]| Area { min: Point::new(x0, y0), max: Point::new(x1, y1) });
+    let within =
+        lesson.within.map(|[x0, y0, x1, y1]| Area { min: Point::new(x0, y0), max: Point::new(x1, y1) });
     let [index, count] = lesson.part;
     let part = Part { index, count };
     let share = match lesson.round {
@@ -226,7 +228,8 @@ pub(super) fn run_lesson(
     }
     if lesson.round == LessonRound::HandOvers && learnt.report.learnt < learnt.report.options {
         let missing = learnt.report.options - learnt.report.learnt;
-        let problem = format!("{missing} options of the building are missing, the lessons on options come first");
+        let problem =
+            format!("{missing} options of the building are missing, the lessons on options come first");
         return Err(BenchError::Engine(problem));
     }
     let text = to_json(&Mark::of(job)) + "\n";
@@ -241,7 +244,9 @@ pub(super) fn is_done(dir: &Path, job: &Job) -> Result<bool, BenchError> {
         Ok(text) if serde_json::from_str::<Mark>(&text).ok() == Some(Mark::of(job)) => Ok(true),
         Ok(_) => {
             let path = path.display();
-            Err(BenchError::Folder(format!("{path}: damaged or of another job; remove it to do the job again")))
+            Err(BenchError::Folder(format!(
+                "{path}: damaged or of another job; remove it to do the job again"
+            )))
         }
         Err(_) => Ok(false),
     }

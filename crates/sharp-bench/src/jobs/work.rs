@@ -13,8 +13,8 @@ use sharp_space::Seed;
 
 use super::engine::EngineMonitor;
 use super::experiment::{Experiment, SharpSettings};
-use super::machine::machine;
 use super::lesson::run_lesson;
+use super::machine::machine;
 use super::manifest::{Job, JobWork, Manifest};
 use super::step::JobStep;
 use crate::error::BenchError;

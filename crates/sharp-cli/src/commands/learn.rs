@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use indicatif::ProgressBar;
 use sharp_bench::{
-    Engine, EngineMonitor, LearnReport, LocalEngine, NamedWorld, SlurmEngine, SolveSettings, Stopwatch, learn,
-    learn_by,
+    Engine, EngineMonitor, LearnReport, LocalEngine, NamedWorld, SlurmEngine, SolveSettings, Stopwatch,
+    learn, learn_by,
 };
 use sharp_plan::{BuildingMonitor, BuildingShare, HandOver, LearntPolicy, Method, Part, RosterOption};
 
