@@ -83,7 +83,7 @@ pub enum LessonRound {
 /// The mark of a finished lesson.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Mark {
+struct LessonMark {
     schema: String,
     /// Key of the job.
     job: String,
@@ -232,7 +232,7 @@ pub(super) fn run_lesson(
             format!("{missing} options of the building are missing, the lessons on options come first");
         return Err(BenchError::Engine(problem));
     }
-    let text = to_json(&Mark::of(job)) + "\n";
+    let text = to_json(&LessonMark::of(job)) + "\n";
     write_atomic(&mark(dir, job), text.as_bytes())?;
     Ok(Ended::Done)
 }
@@ -241,7 +241,7 @@ pub(super) fn run_lesson(
 pub(super) fn is_done(dir: &Path, job: &Job) -> Result<bool, BenchError> {
     let path = mark(dir, job);
     match std::fs::read_to_string(&path) {
-        Ok(text) if serde_json::from_str::<Mark>(&text).ok() == Some(Mark::of(job)) => Ok(true),
+        Ok(text) if serde_json::from_str::<LessonMark>(&text).ok() == Some(LessonMark::of(job)) => Ok(true),
         Ok(_) => {
             let path = path.display();
             Err(BenchError::Folder(format!(
@@ -256,7 +256,7 @@ fn mark(dir: &Path, job: &Job) -> PathBuf {
     dir.join("jobs").join(&job.name).join("done.json")
 }
 
-impl Mark {
+impl LessonMark {
     fn of(job: &Job) -> Self {
         Self { schema: SCHEMA.to_owned(), job: job.key.clone() }
     }

@@ -33,8 +33,8 @@ pub(crate) fn run(args: &Learn, seed: u64, json: bool) -> Result<Exit, Failure> 
         Failure::new("USAGE", "--library is none, expected a folder: what is learnt must be kept somewhere")
     })?;
     let monitor = LearnBar::new();
-    let learnt = match engine(args)? {
-        Some((engine, parts)) => {
+    let learnt = match workers(args)? {
+        Some(Workers { engine, parts }) => {
             learn_by(&*engine, (&place, &settings), &library, (args.within, parts), &monitor)
         }
         None => {
@@ -61,15 +61,22 @@ pub(crate) fn run(args: &Learn, seed: u64, json: bool) -> Result<Exit, Failure> 
     })
 }
 
+/// Who does the work, and in how many parts.
+struct Workers {
+    engine: Box<dyn Engine>,
+    parts: usize,
+}
+
 /// Who does the work and in how many parts; `None` for this process as a whole.
-fn engine(args: &Learn) -> Result<Option<(Box<dyn Engine>, usize)>, Failure> {
+fn workers(args: &Learn) -> Result<Option<Workers>, Failure> {
     let parts = args.jobs.map(|jobs| jobs as usize);
     Ok(match args.engine {
         EngineName::Local => {
-            parts.map(|workers| -> (Box<dyn Engine>, usize) { (Box::new(LocalEngine { workers }), workers) })
+            parts.map(|parts| Workers { engine: Box::new(LocalEngine { workers: parts }), parts })
         }
         EngineName::Slurm => {
-            Some((Box::new(SlurmEngine { program: program()? }), parts.unwrap_or(SLURM_PARTS)))
+            let engine = Box::new(SlurmEngine { program: program()? });
+            Some(Workers { engine, parts: parts.unwrap_or(SLURM_PARTS) })
         }
     })
 }
