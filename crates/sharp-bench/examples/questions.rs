@@ -5,8 +5,9 @@
 //! cargo run --release --workspace --example questions -- a husky interface LIB 1000 200
 //! ```
 //!
-//! The last two numbers: questions, and how many of them are compared with 1,000 executions each and with a plan
-//! that is made without the library (0 leaves both out).
+//! The last two numbers: questions, and how many of them are compared with 1,000 executions each (0 for none). A third
+//! one, 7 where it is left out, is the root of the random starts, goals and executions. With `COLD` set the plans are also
+//! compared with plans that are made without the library, with `SLOW` set slow answers are told.
 
 #![allow(
     clippy::disallowed_methods,
@@ -33,8 +34,12 @@ const EXECUTIONS: u32 = 1000;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [map, robot, kind, library, questions, compared] = &args[..] else {
-        return Err("expected MAP ROBOT KIND LIBRARY QUESTIONS COMPARED".into());
+    let (args, seed) = match &args[..] {
+        [all @ .., seed] if args.len() == 7 => (all, seed.parse()?),
+        all => (all, 7),
+    };
+    let [map, robot, kind, library, questions, compared] = args else {
+        return Err("expected MAP ROBOT KIND LIBRARY QUESTIONS COMPARED [SEED]".into());
     };
     let (questions, compared): (usize, usize) = (questions.parse()?, compared.parse()?);
     let map = load(map, &LoadOptions::default())?;
@@ -52,7 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         sharp.library().len(),
         began.elapsed().as_secs_f64()
     );
-    let asked = random_queries(&place, questions);
+    let asked = random_queries(&place, questions, seed);
     // The first question makes what all others share.
     let first = Instant::now();
     sharp.solve(asked[0], &())?;
@@ -106,7 +111,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "mean in ms: search {:.2}, guides {:.2}, learning {:.2}, odds {:.2}",
         mean_ms[0], mean_ms[1], mean_ms[2], mean_ms[3]
     );
-    compare(&place, &settings, &plans[..compared.min(plans.len())])
+    compare(&place, &settings, &plans[..compared.min(plans.len())], seed)
 }
 
 /// Processor time of all threads so far, milliseconds.
@@ -120,12 +125,12 @@ fn cpu_ms() -> f64 {
 }
 
 /// Starts and goals with room all around, at least a fifth of the map's side (at least 8 m) apart.
-fn random_queries(place: &NamedWorld, count: usize) -> Vec<Query> {
+fn random_queries(place: &NamedWorld, count: usize, seed: u64) -> Vec<Query> {
     let world = &place.world;
     let bounds = world.grid.frame().bounds();
     let side_m = world.grid.frame().width_m().max(world.grid.frame().height_m());
     let least_m = if side_m > 40.0 { 30.0 } else { 8.0 };
-    let mut rng = Seed(7).stream("questions", 0);
+    let mut rng = Seed(seed).stream("questions", 0);
     let mut queries = Vec::new();
     while queries.len() < count {
         let mut pose = || {
@@ -147,6 +152,7 @@ fn compare(
     place: &NamedWorld,
     settings: &SolveSettings,
     plans: &[Box<Plan>],
+    seed: u64,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let (mut close, mut bounded, mut above, mut timed) = (0, 0, 0, 0);
     let (mut alike, mut alike_bounded) = (0, 0);
@@ -154,14 +160,14 @@ fn compare(
     for (index, plan) in plans.iter().enumerate() {
         let odds = plan.solution.composed.clone().expect("nothing was run");
         let plan = Arc::new((**plan).clone());
-        let (count, time_s) = executed(&plan, index as u64);
+        let (count, time_s) = executed(&plan, Seed(seed).child("plan", index as u64));
         let measured = count.rate();
         close += usize::from((odds.success - measured).abs() <= 0.03);
         // What was executed is known to a point or so itself.
         bounded += usize::from(odds.lower95 <= count.upper95() && count.lower95() <= odds.upper95);
         above += usize::from(count.upper95() >= odds.lower95);
         timed += usize::from((odds.time_s / time_s - 1.0).abs() <= 0.05);
-        let same = driven_as_learnt(&plan, index as u64);
+        let same = driven_as_learnt(&plan, Seed(seed).child("same", index as u64));
         alike += usize::from((odds.success - same.rate()).abs() <= 0.03);
         alike_bounded += usize::from(odds.lower95 <= same.upper95() && same.lower95() <= odds.upper95);
         error += odds.success - measured;
@@ -184,7 +190,7 @@ fn compare(
             let alone = SolveSettings { method: Method::fast(), ..settings.clone() };
             let (mut sharp, _) = place.open(&alone, None)?;
             if let Answer::Solved(other) = sharp.solve(plan.solution.query, &())? {
-                let (count, other_s) = executed(&Arc::new(*other), index as u64);
+                let (count, other_s) = executed(&Arc::new(*other), Seed(seed).child("plan", index as u64));
                 cold = [cold[0] + count.rate(), cold[1] + (time_s / other_s).ln(), cold[2] + 1.0];
             }
         }
@@ -222,17 +228,16 @@ fn compare(
 }
 
 /// How often `plan` succeeds as it is executed, and how long that takes, seconds.
-fn executed(plan: &Arc<Plan>, number: u64) -> (SuccessCount, f64) {
-    let executions =
-        run(plan, &RunSettings::new(plan, EXECUTIONS, Seed(99).child("executions", number)), &|| 0.0);
+fn executed(plan: &Arc<Plan>, seed: Seed) -> (SuccessCount, f64) {
+    let executions = run(plan, &RunSettings::new(plan, EXECUTIONS, seed.child("executions", 0)), &|| 0.0);
     let reached = executions.iter().filter(|one| one.end == sharp_drive::EpisodeEnd::Reached);
     let times: Vec<f64> = reached.map(|one| one.record.time_s).collect();
     (success(&executions), times.iter().sum::<f64>() / times.len().max(1) as f64)
 }
 
 /// The same in the simulator that policies are learnt in, without recovery.
-fn driven_as_learnt(plan: &Arc<Plan>, number: u64) -> SuccessCount {
-    let mut settings = RunSettings::new(plan, EXECUTIONS, Seed(98).child("executions", number));
+fn driven_as_learnt(plan: &Arc<Plan>, seed: Seed) -> SuccessCount {
+    let mut settings = RunSettings::new(plan, EXECUTIONS, seed.child("executions", 0));
     settings.simulator = plan.world.simulator(SimulatorKind::Kinematic);
     settings.recovery = false;
     success(&run(plan, &settings, &|| 0.0))

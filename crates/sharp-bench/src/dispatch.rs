@@ -167,7 +167,7 @@ impl Dispatcher {
     }
 
     fn ask(&mut self, query: Query) -> Result<(SolveReport, Option<Plan>), BenchError> {
-        let NamedWorld { map, world, noise, noise_model } = self.place.clone();
+        let NamedWorld { map, world, noise, noise_model, .. } = self.place.clone();
         let problem = NamedProblem { map, world, query, noise, noise_model };
         let monitor = TimedMonitor::new(Stopwatch::start("load"), None, &());
         let report = blank_report(&problem, &self.settings, &mut self.sharp, &self.file)?;

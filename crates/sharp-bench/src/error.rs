@@ -98,6 +98,7 @@ impl BenchError {
             | Self::Result(_)
             | Self::Report(ReportError::File(_) | ReportError::Picture { .. })
             | Self::Folder(_) => "FILE_INVALID",
+            Self::Solve(SolveError::NothingWithin { .. }) => "USAGE",
             Self::Solve(_) => "NO_FREE_SPACE",
             Self::Learning(_) | Self::Panicked | Self::Picture(_) | Self::Report(_) => "FAILED",
             Self::Setting { .. } => "USAGE",

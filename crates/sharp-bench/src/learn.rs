@@ -1,5 +1,6 @@
 //! Learning a whole building: library, abstraction, options, hand-overs, and a report with pictures of where it is weak.
 
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -7,18 +8,21 @@ use serde::Serialize;
 use sharp_drive::World;
 use sharp_maps::MapFile;
 use sharp_plan::{
-    AbstractionFile, Area, BuildingMonitor, BuildingWork, MeasuredStretch, OptionLibrary, Part, Roster,
+    AbstractionFile, Area, BuildingMonitor, BuildingShare, BuildingWork, MeasuredStretch, Part, Roster,
     Sharp, WeakPlace, measured_stretches, weak_places,
 };
 use sharp_sim::NoiseModel;
 use sharp_space::{Cell, GridFrame, Point, Seed};
 
 use crate::error::BenchError;
+use crate::jobs::{Engine, EngineMonitor, Lesson, Manifest, unfinished};
 use crate::named::{self, InputError, noise, robot};
 use crate::pictures;
 use crate::reports::MapReport;
 use crate::solve::{SolveSettings, prepare};
 
+/// How the names of folders begin, beside those of a library, in which workers share the learning of a building.
+const LEARNING: &str = "learning-";
 /// Places that a report names.
 const WEAKEST: usize = 8;
 /// How far from a guide the pictures colour the floor, metres.
@@ -29,6 +33,8 @@ const PAINT_M: f64 = 0.45;
 pub struct NamedWorld {
     /// The name of the map.
     pub map: String,
+    /// The name of the robot, or its file.
+    pub robot: String,
     /// Map and robot.
     pub world: World,
     /// The name of the noise, or its file.
@@ -45,6 +51,7 @@ impl NamedWorld {
     pub fn new(map: &MapFile, robot_name: &str, noise_name: &str) -> Result<Self, InputError> {
         Ok(Self {
             map: map.name.clone(),
+            robot: robot_name.to_owned(),
             world: named::world(map, robot(robot_name)?),
             noise: noise_name.to_owned(),
             noise_model: noise(noise_name)?,
@@ -63,10 +70,7 @@ impl NamedWorld {
     ) -> Result<(Sharp, AbstractionFile), BenchError> {
         let SolveSettings { abstraction, method, simulator, seed } = settings;
         let Self { world, noise_model, .. } = self;
-        let library = match library {
-            Some(root) => OptionLibrary::open_for(root, world, noise_model, *simulator, method)?,
-            None => OptionLibrary::in_memory(),
-        };
+        let library = settings.library(world, noise_model, library)?;
         let (sharp, file) = prepare(world.clone(), abstraction, library.folder(), &())?;
         let sharp = sharp
             .with_method(method.clone())
@@ -148,25 +152,66 @@ pub struct LearntBuilding {
     world: World,
 }
 
-/// Learns the part `part` of the building of `place`, or of the area `within`, into the library in the folder `library`.
+/// Learns the `share` of the building of `place` into the library in the folder `library`.
 ///
 /// # Errors
-/// If the map has no room for the robot, or a file is broken or cannot be written.
+/// If the map has no room for the robot, no option lies within the area, or a file is broken or cannot be written.
 pub fn learn(
     place: &NamedWorld,
     settings: &SolveSettings,
     library: &Path,
-    (within, part): (Option<Area>, Part),
+    share: BuildingShare,
     monitor: &dyn BuildingMonitor,
 ) -> Result<LearntBuilding, BenchError> {
     let (mut sharp, _) = place.open(settings, Some(library))?;
-    let (roster, work) = sharp.learn_building((within, part), monitor)?;
+    let (roster, work) = sharp.learn_building(share, monitor)?;
     let stretches = sharp
         .library()
         .building(&roster.fingerprint)
         .map_or_else(Vec::new, |building| measured_stretches(&roster, building));
     let report = report(place, &sharp, (&roster, &work), &stretches);
     Ok(LearntBuilding { report, stretches, world: place.world.clone() })
+}
+
+/// The same by `engine`, in so many `parts`, which may run anywhere; of the area `within`, or of the whole building. What is
+/// missing at the end is told by the report; the same call goes on with it.
+///
+/// # Errors
+/// If the map has no room for the robot, no option lies within the area, a file is broken or cannot be written, or the
+/// engine cannot do jobs at all.
+pub fn learn_by(
+    engine: &dyn Engine,
+    (place, settings): (&NamedWorld, &SolveSettings),
+    library: &Path,
+    (within, parts): (Option<Area>, usize),
+    monitor: &dyn EngineMonitor,
+) -> Result<LearntBuilding, BenchError> {
+    // The abstraction is made here and kept, so that it is not made by each of the workers.
+    let (mut sharp, _) = place.open(settings, Some(library))?;
+    let size = sharp.abstraction(&())?.options.options().len();
+    let lesson = Lesson::new(place, settings, within, (parts, size))?;
+    // Whatever the build of the program, it goes on in the same folder.
+    let name = Lesson { version: String::new(), ..lesson.clone() }.key();
+    let dir = library.join(format!("{LEARNING}{}", &name[..8]));
+    fs::create_dir_all(&dir).map_err(|error| BenchError::Folder(format!("{}: {error}", dir.display())))?;
+    sharp_maps::save_ros(&place.world.grid, &lesson.map_file(&dir))?;
+    let (manifest, indices) = Manifest::extend(&dir, lesson.all(), "sharp learn")?;
+    for round in indices.chunks(parts) {
+        for error in engine.run(&manifest, round, monitor)? {
+            monitor.message(&format!("error: {error}"));
+        }
+        let missing = unfinished(&manifest);
+        if round.iter().any(|index| missing.contains(index)) {
+            // What the workers should have done is not done here.
+            let nothing = BuildingShare { within, options: Part::NONE, hand_overs: Part::NONE };
+            return learn(place, settings, library, nothing, &());
+        }
+    }
+    let learnt =
+        learn(place, settings, library, BuildingShare { within, ..BuildingShare::ALL }, monitor.building())?;
+    // A folder that stays is found finished by the next call.
+    let _ = fs::remove_dir_all(&dir);
+    Ok(learnt)
 }
 
 fn report(

@@ -64,12 +64,12 @@ pub use dispatch::{DispatchLine, DispatchReply, Dispatcher, Odds};
 pub use error::BenchError;
 pub use evaluation::{ReportError, ReportInput, table, totals, write_report};
 pub use jobs::{
-    Done, Ended, Engine, EngineMonitor, Experiment, Inputs, Job, LocalEngine, Manifest, Merged,
-    SharpSettings, SlurmEngine, SlurmScripts, Submission, Suite, SuiteSelection, System, clean,
-    count_results, merge, run_job, unfinished,
+    Done, Ended, Engine, EngineMonitor, Experiment, Inputs, Job, JobWork, Lesson, LessonRound, LocalEngine,
+    Manifest, Merged, SharpSettings, SlurmEngine, SlurmScripts, Submission, Suite, SuiteSelection, System,
+    clean, count_results, merge, run_job, unfinished,
 };
 pub use json::to_json;
-pub use learn::{BuildingSuccess, LearnReport, LearntBuilding, NamedWorld, WeakReport, learn};
+pub use learn::{BuildingSuccess, LearnReport, LearntBuilding, NamedWorld, WeakReport, learn, learn_by};
 pub use measure::{BaselineKind, BaselineSettings, MeasureMonitor, measure};
 pub use named::{InputError, NamedProblem};
 pub use prior::{

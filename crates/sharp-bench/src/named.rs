@@ -13,7 +13,7 @@ use sharp_regions::{
     RegionPredictor,
 };
 use sharp_sim::{NoiseError, NoiseModel, RobotError, RobotModel};
-use sharp_space::{Point, RegionDetector, Seed};
+use sharp_space::{Detection, Footprint, OccupancyGrid, Point, RegionDetector, Seed};
 use thiserror::Error;
 
 /// Larger than any description of a robot, a noise or regions, bytes.
@@ -157,7 +157,7 @@ pub fn noise(name: &str) -> Result<NoiseModel, InputError> {
 /// # Errors
 /// If it is no known name and no file, or the file lists a place without room for the robot.
 pub fn detector(world: &World, name: &str) -> Result<Arc<dyn RegionDetector>, InputError> {
-    let network = || NetworkDetector::new(RegionPredictor::shipped_for(&world.robot.footprint));
+    let network = || ShippedNetwork;
     // As many regions as the network finds: what a predictor must beat.
     let count = || RegionCount::Like(Arc::new(network()));
     Ok(match name {
@@ -167,6 +167,15 @@ pub fn detector(world: &World, name: &str) -> Result<Arc<dyn RegionDetector>, In
         "grid" => Arc::new(GridDetector { count: count() }),
         file => Arc::new(places(world, file)?),
     })
+}
+
+/// The shipped network, read when it is asked: where the states are known already nobody asks.
+struct ShippedNetwork;
+
+impl RegionDetector for ShippedNetwork {
+    fn detect(&self, grid: &OccupancyGrid, footprint: &Footprint) -> Detection {
+        NetworkDetector::new(RegionPredictor::shipped_for(footprint)).detect(grid, footprint)
+    }
 }
 
 /// The places listed in `file`, each of which must have room for the robot.

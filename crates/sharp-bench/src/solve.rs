@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use sharp_options::OptionKind;
 use sharp_plan::{
-    AbstractionFile, AbstractionSettings, Answer, Method, Monitor, OptionLibrary, Phase, Plan, Sharp, Tour,
-    hash, map_hash, success, write_atomic,
+    AbstractionFile, AbstractionSettings, Answer, LibraryKey, Method, Monitor, OptionLibrary, Phase, Plan,
+    Sharp, Tour, hash, map_hash, success, write_atomic,
 };
 use sharp_rbvd::CellMetric;
-use sharp_sim::SimulatorKind;
+use sharp_sim::{NoiseModel, SimulatorKind};
 use sharp_space::Seed;
 
 use crate::error::BenchError;
@@ -17,6 +17,7 @@ use crate::json::to_json;
 use crate::named::{DETECTORS, NamedProblem, detector};
 use crate::pictures;
 use crate::reports::{MapReport, SolveReport, Verified};
+use crate::result::default_regions;
 use crate::stopwatch::TimedMonitor;
 use crate::times::{Reuse, SolveTimes};
 use sharp_drive::World;
@@ -78,10 +79,7 @@ pub fn solve(
     let NamedProblem { world, query, noise_model, .. } = problem;
     let SolveSettings { abstraction, method, simulator, seed } = settings;
     query.check(world)?;
-    let library = match library {
-        Some(root) => OptionLibrary::open_for(root, world, noise_model, *simulator, method)?,
-        None => OptionLibrary::in_memory(),
-    };
+    let library = settings.library(world, noise_model, library)?;
     monitor.phase(Phase::Done);
     let (sharp, file) = prepare(world.clone(), abstraction, library.folder(), monitor)?;
     let mut sharp = sharp
@@ -148,11 +146,45 @@ pub fn prepare(
 impl AbstractionRequest {
     /// Under which name a library keeps it.
     fn file_name(&self) -> String {
-        let regions = match self.regions.as_str() {
+        format!("abstraction-{:?}-{:?}-{}.ron", self.options, self.metric, self.regions_name()).to_lowercase()
+    }
+
+    /// The detector, or the file of places by its content.
+    fn regions_name(&self) -> String {
+        match self.regions.as_str() {
             name if DETECTORS.contains(&name) => name.to_owned(),
             file => hash(&std::fs::read(file).unwrap_or_default())[..8].to_owned(),
-        };
-        format!("abstraction-{:?}-{:?}-{regions}.ron", self.options, self.metric).to_lowercase()
+        }
+    }
+
+    /// What tells the states apart from those of other settings; empty for the usual ones, so that libraries from before
+    /// there was such a name stay valid.
+    fn states_name(&self) -> String {
+        let usual = (default_regions(), CellMetric::default());
+        if (&self.regions, self.metric) == (&usual.0, usual.1) {
+            return String::new();
+        }
+        format!("{} {:?}", self.regions_name(), self.metric)
+    }
+}
+
+impl SolveSettings {
+    /// The library in the folder `root` for what is learnt in `world` under `noise`; without a folder one that is kept
+    /// nowhere.
+    ///
+    /// # Errors
+    /// Names the file that is damaged or of another format.
+    pub fn library(
+        &self,
+        world: &World,
+        noise: &NoiseModel,
+        root: Option<&Path>,
+    ) -> Result<OptionLibrary, BenchError> {
+        let Some(root) = root else { return Ok(OptionLibrary::in_memory()) };
+        let states = self.abstraction.states_name();
+        let Self { method, simulator, .. } = self;
+        let key = LibraryKey { world, noise, simulator: *simulator, method, states: &states };
+        Ok(OptionLibrary::open_for(root, &key)?)
     }
 }
 
@@ -214,8 +246,12 @@ impl Solved {
         plan.save(folder, file)?;
         let grid = &plan.world.grid;
         sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
-        pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction))?;
-        pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[]))?;
+        // They take as long as the answer.
+        let (of_states, of_plan) = rayon::join(
+            || pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction)),
+            || pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[])),
+        );
+        of_states.and(of_plan)?;
         write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;
         Ok(())
     }

@@ -183,3 +183,15 @@ fn a_session_with_serve_has_lines_of_the_schema() {
     let said = python::script(&python, &script, &[Path::new(env!("CARGO_BIN_EXE_sharp")), &plan, &schema]);
     assert!(said.contains("all lines are sound"), "{said}");
 }
+
+#[test]
+fn a_session_with_a_learnt_building_has_lines_of_the_schema() {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let Some(python) = python::python(&tests.join("serve-requirements.txt")) else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let (script, schema) =
+        (tests.join("check_serve_library.py"), root().join("docs/serve-library.schema.json"));
+    let words = [Path::new(env!("CARGO_BIN_EXE_sharp")), folder.path(), &schema];
+    let said = python::script(&python, &script, &words);
+    assert!(said.contains("all lines are sound"), "{said}");
+}

@@ -13,6 +13,7 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -40,7 +41,12 @@ const PATIENCE: Duration = Duration::from_secs(180);
 struct Cluster {
     root: tempfile::TempDir,
     down: PathBuf,
+    /// Clusters share the ports of the machine.
+    _turn: MutexGuard<'static, ()>,
 }
+
+/// Held by the test that has a cluster.
+static TURN: Mutex<()> = Mutex::new(());
 
 impl Cluster {
     /// Starts a cluster, or says what is missing.
@@ -53,10 +59,11 @@ impl Cluster {
         if user.stdout.trim_ascii() != b"0" {
             return Err("only root can start a cluster".into());
         }
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         // The daemons run as several users.
         let everyone = fs::Permissions::from_mode(0o755);
         let root = tempfile::Builder::new().permissions(everyone).tempdir().expect("a folder");
-        let cluster = Self { root, down: up.with_file_name("down.sh") };
+        let cluster = Self { root, down: up.with_file_name("down.sh"), _turn: turn };
         let started = Command::new("bash").arg(&up).arg(cluster.root.path()).status().expect("bash runs");
         assert!(started.success(), "{} did not start a cluster", up.display());
         Ok(cluster)
@@ -98,12 +105,16 @@ impl Cluster {
 
     /// The process of the task that does job `index`, as soon as it runs and is not one of `before`.
     fn payload(&self, index: usize, before: &[u32]) -> u32 {
+        self.payload_in(&self.root.path().join("slurm"), index, before)
+    }
+
+    /// The same in the folder `folder` or one below it.
+    fn payload_in(&self, folder: &Path, index: usize, before: &[u32]) -> u32 {
         let block = format!("{index}..{}", index + 1);
-        let folder = self.root.path().join("slurm").display().to_string();
         let is_ours = |pid: &u32| {
             let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-            let words: Vec<&[u8]> = line.split(|&byte| byte == 0).collect();
-            words.contains(&block.as_bytes()) && words.contains(&folder.as_bytes())
+            let words: Vec<&str> = line.split(|&byte| byte == 0).flat_map(std::str::from_utf8).collect();
+            words.contains(&&*block) && words.iter().any(|word| Path::new(word).starts_with(folder))
         };
         wait_for(&format!("the task of job {index}"), || {
             let pids = fs::read_dir("/proc").expect("processes").flatten();
@@ -210,4 +221,53 @@ fn a_cluster_that_loses_tasks_ends_with_the_results_of_one_machine() {
     assert_eq!(cluster.sharp(&["jobs", "merge", "slurm"]).status.code(), Some(0), "nothing is missing");
     drop(cluster);
     daemon.wait().expect("the daemon of the node has been stopped");
+}
+
+/// What a folder holds, by name below it.
+fn tree(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(&next).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).expect("below it").to_owned();
+                files.push((name, fs::read(&path).expect("a file")));
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+#[test]
+fn a_building_learnt_on_a_cluster_that_loses_a_task_has_the_bytes_of_one_process() {
+    let cluster = match Cluster::start() {
+        Ok(cluster) => cluster,
+        Err(missing) => return println!("skipped: {missing}"),
+    };
+    let folder = cluster.root.path().to_owned();
+    let building = ["learn", "a", "--options", "centroid", "--within", "0,0,15,8", "--library"];
+    let on_cluster = [&building[..], &["slurm", "--engine", "slurm", "--jobs", "3"]].concat();
+    let mut learner = cluster.command(env!("CARGO_BIN_EXE_sharp"), &on_cluster);
+    let learner = learner.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the binary runs");
+    let first_round = cluster.payload(1, &[]);
+    // It may be over already: these lessons are short.
+    let _ = Command::new("kill").args(["-KILL", &first_round.to_string()]).status();
+    let second_round = cluster.payload(4, &[first_round]);
+    let _ = Command::new("kill").args(["-KILL", &second_round.to_string()]).status();
+    let learner = learner.wait_with_output().expect("a child");
+    assert_eq!(learner.status.code(), Some(0), "{learner:?}");
+
+    let here = cluster.sharp(&[&building[..], &["local"]].concat());
+    assert_eq!(here.status.code(), Some(0), "{here:?}");
+    let threads = cluster.sharp(&[&building[..], &["threads", "--jobs", "2"]].concat());
+    assert_eq!(threads.status.code(), Some(0), "{threads:?}");
+    let names = |name: &str| tree(&folder.join(name)).into_iter().map(|file| file.0).collect::<Vec<_>>();
+    assert_eq!(names("slurm"), names("local"));
+    for other in ["slurm", "threads"] {
+        assert!(tree(&folder.join(other)) == tree(&folder.join("local")), "{other} and one process");
+    }
 }

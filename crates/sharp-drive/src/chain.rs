@@ -43,9 +43,12 @@ pub(crate) struct Chain {
 
 impl Chain {
     pub(crate) fn new(drivers: &[Driver<'_>]) -> Self {
-        let links = drivers.iter().map(|driver| driver.link.clone()).collect();
+        let links: Arc<[Link]> = drivers.iter().map(|driver| driver.link.clone()).collect();
         let policies: Vec<OptionPolicy> = drivers.iter().map(|driver| driver.policy.clone()).collect();
-        let uses_slip_estimate = policies.iter().any(Policy::uses_slip_estimate);
+        // Who leaves a tight place with care compensates its drift, whatever policy drives afterwards.
+        let is_careful = |link: &Link| link.option.departure.careful_m > 0.0;
+        let uses_slip_estimate =
+            policies.iter().any(Policy::uses_slip_estimate) || links.iter().any(is_careful);
         Self { links, policies, uses_slip_estimate }
     }
 

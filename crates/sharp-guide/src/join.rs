@@ -4,6 +4,7 @@
 //! comes from somewhere and goes on to somewhere. So the guides of the plan are smoothed together and cut where
 //! they come nearest to those centres. The library keeps the guides as they were planned.
 
+use std::cell::Cell as Memory;
 use std::sync::Arc;
 
 use sharp_space::{Cell, Heading, Point, Pose};
@@ -58,9 +59,19 @@ fn joined(
     let way: Vec<Point> =
         options.iter().flat_map(|option| option.guide.poses().iter().map(|pose| pose.position)).collect();
     let frame = options[0].states.frame();
-    let allowed = |cell: Cell| {
+    let looked = |cell: Cell| {
         let pose = Pose::at(frame.center(cell), start.heading);
         options.iter().any(|option| option.states.state_of(cell).is_some() && option.is_allowed(&pose))
+    };
+    // Smoothing looks at the same cells hundreds of times.
+    let seen = vec![Memory::new(None); frame.len()];
+    let allowed = |cell: Cell| {
+        let memory = &seen[frame.index(cell)];
+        memory.get().unwrap_or_else(|| {
+            let is_allowed = looked(cell);
+            memory.set(Some(is_allowed));
+            is_allowed
+        })
     };
     let request = GuideRequest {
         start: GuideEnd { position: way[0], heading: Some(start.heading) },

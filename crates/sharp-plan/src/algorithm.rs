@@ -15,13 +15,14 @@ use crate::files::FileError;
 use crate::known::KnownOptions;
 use crate::learn::learn_missing;
 use crate::library::OptionLibrary;
+use crate::odds::{ComposedOdds, refine};
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Phase;
 use crate::reason::{is_joined, obstruction, unturned};
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
-use crate::verify::{PlannedOption, Solution, predict, verify};
+use crate::verify::{PlannedOption, Solution, composed, predict, verify};
 
 /// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
@@ -29,6 +30,9 @@ const ATTEMPTS_MAX: usize = 24;
 const VERIFIED_MAX: usize = 4;
 /// The same where odds are composed.
 const COMPOSED_MAX: usize = 2;
+/// Composed plans that succeed less often than this between their first and last pieces are compared with the direct way:
+/// it takes half of the time of an answer to guide and to drive, and is seldom better where options do well.
+const COMPOSED_WELL: f64 = 0.98;
 
 /// How solving ended.
 #[derive(Debug)]
@@ -89,13 +93,17 @@ fn algorithm_1(
     monitor.phase(Phase::Search);
     // 8: s_i, s_g <- get_abstract_states(x_i, x_g)
     let mut search = match Search::new(world, abstraction, method, &conditions.noise, query, [], seed) {
-        // Composed odds are for those in a hurry: there a tight start is left by its price.
-        Ok(search) if method.verify_episodes == 0 => search.with_known(Arc::clone(known)),
-        Ok(search) => search.with_known(Arc::clone(known)).with_trials(conditions),
+        // Composed odds are for those in a hurry.
+        Ok(search) => {
+            let is_hurried = method.verify_episodes == 0;
+            search.with_known(Arc::clone(known)).with_trials(conditions, is_hurried)
+        }
         Err(unplaced) => return Ok(Outcome::NoPlan(describe(problem, &unplaced.to_string()))),
     };
     let mut policies = Policies::new(library);
+    let mut most = if method.verify_episodes == 0 { COMPOSED_MAX } else { VERIFIED_MAX };
     let (mut best, mut verified): (Option<Solution>, usize) = (None, 0);
+    let mut chosen = vec![];
     for _ in 0..ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
         let Some((_, p)) = cheapest(problem, &mut search, &policies) else {
@@ -139,22 +147,23 @@ fn algorithm_1(
             false => verify(problem, &p, &policies),
         };
         verified += 1;
-        // Answers at once leave the direct way, which takes long to guide and to drive, for where there is no other.
-        if !is_composed {
-            search.offer_direct();
+        if !is_composed || solution.composed.as_ref().is_some_and(fails_on_the_way) {
+            most += usize::from(search.offer_direct() && is_composed);
         }
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
         let cost_s = |solution: &Solution| solution.cost_s(method.failure_cost_s);
         if best.as_ref().is_none_or(|best| cost_s(&solution) < cost_s(best)) {
             best = Some(solution);
+            chosen.clone_from(&p);
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
-        if is_stopped
-            || verified == if is_composed { COMPOSED_MAX } else { VERIFIED_MAX }
-            || best_s <= method.retry_above * other_s(&mut search, &policies)
-        {
+        if is_stopped || verified == most || best_s <= method.retry_above * other_s(&mut search, &policies) {
             break;
         }
+    }
+    if let Some(odds) = best.as_ref().and_then(|best| best.composed.as_ref()) {
+        let odds = refine(problem, &chosen, &policies, odds);
+        best = Some(composed(problem, &chosen, &policies, odds));
     }
     // 21: return Pi. A plan that never succeeds is none, unless whatever was learnt is to be kept.
     let keeps_all = method.usable_success == 0.0;
@@ -162,6 +171,12 @@ fn algorithm_1(
         Some(solution) => Outcome::Solved(Box::new(solution)),
         None => Outcome::NoPlan(describe(problem, &describe_search(&search))),
     })
+}
+
+/// Whether a plan fails too often where its options drive. Who cannot leave the start cannot do so directly either.
+fn fails_on_the_way(odds: &ComposedOdds) -> bool {
+    let known = odds.pieces.len().saturating_sub(1);
+    odds.pieces.iter().take(known).skip(1).map(|piece| piece.success).product::<f64>() < COMPOSED_WELL
 }
 
 fn names(plan: &[Arc<GuidedOption>]) -> Vec<LegId> {

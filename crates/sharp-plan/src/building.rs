@@ -20,7 +20,7 @@ use crate::hand_over::{DrivenOption, HandOver, chain_key, drive_hand_over, ident
 use crate::learn::{LearnFailure, LearningTask, LearntPolicy};
 use crate::library::{OptionLibrary, StoredOption};
 use crate::method::Method;
-use crate::roster::{Roster, RosterOption};
+use crate::roster::{Area, Roster, RosterOption};
 
 /// Options that are learnt before it is asked whether to go on.
 const OPTIONS_AT_ONCE: usize = 16;
@@ -72,9 +72,33 @@ pub struct Part {
 impl Part {
     /// All of the work.
     pub const ALL: Self = Self { index: 0, count: 1 };
+    /// Nothing of it: what is there is looked at.
+    pub const NONE: Self = Self { index: 1, count: 1 };
 
     const fn has(self, unit: usize) -> bool {
         unit % self.count == self.index
+    }
+}
+
+/// What is wanted of the learning of a building.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BuildingShare {
+    /// Only the options whose both ends lie there, and the hand-overs between them.
+    pub within: Option<Area>,
+    /// Which part of the options.
+    pub options: Part,
+    /// Which part of the hand-overs, of those whose options are there.
+    pub hand_overs: Part,
+}
+
+impl BuildingShare {
+    /// The whole building.
+    pub const ALL: Self = Self { within: None, options: Part::ALL, hand_overs: Part::ALL };
+
+    /// The part `part` of both options and hand-overs.
+    #[must_use]
+    pub const fn part(part: Part) -> Self {
+        Self { within: None, options: part, hand_overs: part }
     }
 }
 
@@ -109,46 +133,142 @@ pub struct BuildingWork {
     pub is_whole: bool,
 }
 
-/// Learns the part `part` of the options of `roster` that `library` lacks.
-///
-/// # Errors
-/// If the library cannot be written.
-pub fn learn_options(
-    (site, roster): (&LearningSite<'_>, &Roster),
-    library: &mut OptionLibrary,
-    part: Part,
-    monitor: &dyn BuildingMonitor,
-    work: &mut BuildingWork,
-) -> Result<(), FileError> {
-    let mine: Vec<&RosterOption> = roster
-        .options
-        .iter()
-        .enumerate()
-        .filter(|(unit, _)| part.has(*unit))
-        .map(|(_, option)| option)
-        .collect();
-    for chunk in mine.chunks(OPTIONS_AT_ONCE) {
-        let shared = &*library;
-        let results: Vec<_> = chunk.par_iter().map(|option| obtain(site, shared, option, monitor)).collect();
-        for (option, result) in chunk.iter().zip(results) {
-            match result {
-                Obtained::Kept => work.kept += 1,
-                Obtained::Adopted(learnt) => {
-                    work.adopted += 1;
-                    keep(library, option, learnt)?;
+/// What is to be learnt where, and by whom.
+#[derive(Clone, Copy)]
+pub struct BuildingTask<'a> {
+    /// Where and how.
+    pub site: &'a LearningSite<'a>,
+    /// What there is to learn.
+    pub roster: &'a Roster,
+    /// What of it is done here.
+    pub share: BuildingShare,
+    /// Who watches.
+    pub monitor: &'a dyn BuildingMonitor,
+}
+
+impl std::fmt::Debug for BuildingTask<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("BuildingTask").field("share", &self.share).finish_non_exhaustive()
+    }
+}
+
+impl BuildingTask<'_> {
+    /// Learns the options of this part that `library` lacks.
+    ///
+    /// # Errors
+    /// If the library cannot be written.
+    pub fn learn_options(
+        &self,
+        library: &mut OptionLibrary,
+        work: &mut BuildingWork,
+    ) -> Result<(), FileError> {
+        let Self { site, roster, share, monitor } = *self;
+        let mine: Vec<&RosterOption> = roster
+            .options
+            .iter()
+            .enumerate()
+            .filter(|(unit, _)| share.options.has(*unit))
+            .map(|(_, option)| option)
+            .collect();
+        for chunk in mine.chunks(OPTIONS_AT_ONCE) {
+            let shared = &*library;
+            let results: Vec<_> =
+                chunk.par_iter().map(|option| obtain(site, shared, option, monitor)).collect();
+            for (option, result) in chunk.iter().zip(results) {
+                match result {
+                    Obtained::Kept => work.kept += 1,
+                    Obtained::Adopted(learnt) => {
+                        work.adopted += 1;
+                        keep(library, option, learnt)?;
+                    }
+                    Obtained::Learnt(learnt) => {
+                        work.learnt.push(option.id);
+                        keep(library, option, learnt)?;
+                    }
+                    Obtained::Stopped => return Ok(()),
                 }
-                Obtained::Learnt(learnt) => {
-                    work.learnt.push(option.id);
-                    keep(library, option, learnt)?;
+                if let Some(stored) = library.get(option.id) {
+                    monitor.option(option, &stored.learnt);
                 }
-                Obtained::Stopped => return Ok(()),
-            }
-            if let Some(stored) = library.get(option.id) {
-                monitor.option(option, &stored.learnt);
             }
         }
+        Ok(())
     }
-    Ok(())
+
+    /// The hand-overs of this part that have all they need, driven where nobody did before. Blocks of them are kept until
+    /// the building is whole.
+    ///
+    /// # Errors
+    /// If the library cannot be read or written.
+    pub fn learn_hand_overs(
+        &self,
+        library: &mut OptionLibrary,
+        work: &mut BuildingWork,
+    ) -> Result<(), FileError> {
+        let Self { roster, share, monitor, .. } = *self;
+        let identities: Vec<Option<String>> =
+            roster.options.iter().map(|option| known_identity(library, option)).collect();
+        let known = library.hand_overs_by_key();
+        let (mut all, mut is_whole) = (Vec::with_capacity(roster.hand_overs.len()), true);
+        for (unit, block) in roster.hand_overs.chunks(BLOCK).enumerate() {
+            let kept = library.read_block(&roster.fingerprint, unit)?;
+            let kept: BTreeMap<String, HandOver> =
+                kept.into_iter().map(|one| (one.key.clone(), one)).collect();
+            let wanted: Vec<Option<Wanted>> = block
+                .iter()
+                .map(|&(before, after)| Wanted::new(roster, &identities, before, after))
+                .collect();
+            let find = |key: &String| kept.get(key).or_else(|| known.get(key));
+            let is_known = wanted.iter().all(|one| one.as_ref().is_some_and(|one| find(&one.key).is_some()));
+            if !share.hand_overs.has(unit) && !is_known || monitor.should_stop() {
+                is_whole = false;
+                continue;
+            }
+            let shared = &*library;
+            let obtain = |one: &Option<Wanted>| -> Option<(bool, HandOver)> {
+                let Wanted { chain, key } = one.as_ref()?;
+                let found = find(key).map(|found| (false, found.clone()));
+                let (is_new, hand_over) = found.or_else(|| Some((true, self.drive(shared, chain, key)?)))?;
+                Some((is_new, named(roster, chain, hand_over)))
+            };
+            let done: Vec<Option<(bool, HandOver)>> = wanted.par_iter().map(obtain).collect();
+            is_whole &= done.iter().all(Option::is_some);
+            let done: Vec<(bool, HandOver)> = done.into_iter().flatten().collect();
+            let fresh = done.iter().filter(|one| one.0).count();
+            work.hand_overs.0 += fresh;
+            work.hand_overs.1 += done.len() - fresh;
+            let done: Vec<HandOver> = done.into_iter().map(|one| one.1).collect();
+            done.iter().for_each(|one| monitor.hand_over(one));
+            if fresh > 0 {
+                library.write_block(&roster.fingerprint, unit, &done)?;
+            }
+            all.extend(done);
+        }
+        work.is_whole = is_whole && identities.iter().all(Option::is_some);
+        if work.is_whole {
+            let building = Building {
+                format: BUILDING_FORMAT,
+                fingerprint: roster.fingerprint.clone(),
+                unguided: roster.unguided.clone(),
+                hand_overs: all,
+            };
+            library.keep_building(building.with_rest_of(library.building(&roster.fingerprint)))?;
+        }
+        Ok(())
+    }
+
+    /// Drives the hand-over of `chain`; `None` while one of its options is not learnt.
+    fn drive(&self, library: &OptionLibrary, chain: &[usize], key: &str) -> Option<HandOver> {
+        let driven = |&position: &usize| {
+            let RosterOption { id, option, .. } = &self.roster.options[position];
+            Some(DrivenOption { option, policy: &library.get(*id)?.learnt.policy })
+        };
+        let driven = chain.iter().map(driven).collect::<Option<Vec<_>>>()?;
+        let LearningSite { world, method, conditions, seed, .. } = *self.site;
+        let seed = seed.child(&format!("hand-over {key}"), 0);
+        let estimate = drive_hand_over((world, conditions, method), &driven, seed);
+        Some(HandOver::new(key.to_owned(), estimate))
+    }
 }
 
 enum Obtained {
@@ -200,76 +320,6 @@ fn keep(library: &mut OptionLibrary, option: &RosterOption, learnt: LearntPolicy
     let RosterOption { id, option, corridor, .. } = option;
     let stored = StoredOption { guide: option.guide.clone(), learnt, corridor: corridor.clone() };
     library.insert(*id, stored)
-}
-
-/// The part of the roster's hand-overs that has all it needs, driven where nobody did before. Blocks of them are kept
-/// until the building is whole.
-///
-/// # Errors
-/// If the library cannot be read or written.
-pub fn learn_hand_overs(
-    (site, roster): (&LearningSite<'_>, &Roster),
-    library: &mut OptionLibrary,
-    part: Part,
-    monitor: &dyn BuildingMonitor,
-    work: &mut BuildingWork,
-) -> Result<(), FileError> {
-    let identities: Vec<Option<String>> =
-        roster.options.iter().map(|option| known_identity(library, option)).collect();
-    let known = library.hand_overs_by_key();
-    let (mut all, mut is_whole) = (Vec::with_capacity(roster.hand_overs.len()), true);
-    for (unit, block) in roster.hand_overs.chunks(BLOCK).enumerate() {
-        let kept = library.read_block(&roster.fingerprint, unit)?;
-        let kept: BTreeMap<String, HandOver> = kept.into_iter().map(|one| (one.key.clone(), one)).collect();
-        let wanted: Vec<Option<Wanted>> =
-            block.iter().map(|&(before, after)| Wanted::new(roster, &identities, before, after)).collect();
-        let find = |key: &String| kept.get(key).or_else(|| known.get(key));
-        let is_known = wanted.iter().all(|one| one.as_ref().is_some_and(|one| find(&one.key).is_some()));
-        if !part.has(unit) && !is_known || monitor.should_stop() {
-            is_whole = false;
-            continue;
-        }
-        let shared = &*library;
-        let drive = |one: &Option<Wanted>| -> Option<(bool, HandOver)> {
-            let Wanted { chain, key } = one.as_ref()?;
-            if let Some(found) = find(key) {
-                return Some((false, named(roster, chain, found.clone())));
-            }
-            let driven = |&position: &usize| {
-                let RosterOption { id, option, .. } = &roster.options[position];
-                Some(DrivenOption { option, policy: &shared.get(*id)?.learnt.policy })
-            };
-            let driven = chain.iter().map(driven).collect::<Option<Vec<_>>>()?;
-            let LearningSite { world, method, conditions, seed, .. } = *site;
-            let seed = seed.child(&format!("hand-over {key}"), 0);
-            let estimate = drive_hand_over((world, conditions, method), &driven, seed);
-            Some((true, named(roster, chain, HandOver::new(key.clone(), estimate))))
-        };
-        let done: Vec<Option<(bool, HandOver)>> = wanted.par_iter().map(drive).collect();
-        is_whole &= done.iter().all(Option::is_some);
-        let done: Vec<(bool, HandOver)> = done.into_iter().flatten().collect();
-        let fresh = done.iter().filter(|one| one.0).count();
-        work.hand_overs.0 += fresh;
-        work.hand_overs.1 += done.len() - fresh;
-        let done: Vec<HandOver> = done.into_iter().map(|one| one.1).collect();
-        done.iter().for_each(|one| monitor.hand_over(one));
-        if fresh > 0 {
-            library.write_block(&roster.fingerprint, unit, &done)?;
-        }
-        all.extend(done);
-    }
-    let has_all_options = identities.iter().all(Option::is_some);
-    work.is_whole = is_whole && has_all_options;
-    if work.is_whole {
-        let building = Building {
-            format: BUILDING_FORMAT,
-            fingerprint: roster.fingerprint.clone(),
-            unguided: roster.unguided.clone(),
-            hand_overs: all,
-        };
-        library.keep_building(building.with_rest_of(library.building(&roster.fingerprint)))?;
-    }
-    Ok(())
 }
 
 impl Building {
@@ -381,9 +431,10 @@ mod tests {
         let roster = Roster::new(&site, None);
         let mut library = OptionLibrary::open(root, map).expect("a sound folder");
         let mut work = BuildingWork::default();
-        learn_options((&site, &roster), &mut library, part, monitor, &mut work).expect("written");
+        let task = BuildingTask { site: &site, roster: &roster, share: BuildingShare::part(part), monitor };
+        task.learn_options(&mut library, &mut work).expect("written");
         if !monitor.should_stop() {
-            learn_hand_overs((&site, &roster), &mut library, part, monitor, &mut work).expect("written");
+            task.learn_hand_overs(&mut library, &mut work).expect("written");
         }
         work
     }

@@ -65,7 +65,7 @@ mod test_worlds;
 pub use abstraction::{Abstraction, AbstractionSettings, construct};
 pub use algorithm::{Outcome, solve};
 pub use building::{
-    Building, BuildingMonitor, BuildingWork, LearningSite, Part, learn_hand_overs, learn_options,
+    Building, BuildingMonitor, BuildingShare, BuildingTask, BuildingWork, LearningSite, Part,
 };
 pub use composed::{ComposedPolicy, Events};
 pub use conditions::Conditions;
@@ -77,7 +77,7 @@ pub use learn::{
     LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner, PaperProtocol, PriorOnly,
     Selection,
 };
-pub use library::{FORMAT, OptionLibrary, StoredOption};
+pub use library::{FORMAT, LibraryKey, OptionLibrary, StoredOption};
 pub use method::{LearningOrder, Method, PriceRule, RepairSettings, SearchSettings};
 pub use odds::{ComposedOdds, PlanPiece};
 pub use option_graph::{Candidate, OptionGraph};

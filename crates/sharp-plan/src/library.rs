@@ -3,8 +3,10 @@
 //! A library folder holds one folder per key (`world-map`: robot, noise, learning mode and format
 //! make the world), so that a policy is never used in a world it was not learnt in. Each option is
 //! one text file that names its weights by their hash: a reader finds the old option or the new one,
-//! never a mix. When the map changes, an option whose corridor did not change keeps its policy and
-//! its certificate ([`OptionLibrary::adopt`]).
+//! never a mix. Options that are saved together are first written to one file, the intent, whose name
+//! appears at once: a reader finds all of them or none, wherever the writer was killed. When the map
+//! changes, an option whose corridor did not change keeps its policy and its certificate
+//! ([`OptionLibrary::adopt`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -31,6 +33,8 @@ use crate::plan_file::map_hash;
 pub const FORMAT: u32 = 6;
 /// How the names of files of whole buildings begin.
 const BUILDING: &str = "building-";
+/// How the names of intents begin: options that are about to be written, all of them or none.
+const INTENT: &str = "saving-";
 
 /// A policy as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,7 +117,7 @@ pub struct StoredOption {
     pub corridor: String,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OptionFile {
     format: u32,
@@ -127,6 +131,30 @@ struct OptionFile {
     gradient_steps: u64,
 }
 
+/// Options that were to be written at once.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct IntentFile {
+    format: u32,
+    options: Vec<OptionFile>,
+}
+
+/// What the policies of a library depend on beside the map: those of two worlds never mix.
+#[derive(Clone, Copy, Debug)]
+pub struct LibraryKey<'a> {
+    /// Map, robot, speed limits and prior.
+    pub world: &'a World,
+    /// The noise.
+    pub noise: &'a NoiseModel,
+    /// The simulator of learning.
+    pub simulator: SimulatorKind,
+    /// Its name tells how policies are learnt.
+    pub method: &'a Method,
+    /// How the states were made, empty for the usual way: under equal names the options of two ways lead to different
+    /// places.
+    pub states: &'a str,
+}
+
 /// Learnt options by name, in memory and, where a folder is given, on disk.
 #[derive(Debug, Default)]
 pub struct OptionLibrary {
@@ -136,8 +164,11 @@ pub struct OptionLibrary {
     buildings: BTreeMap<String, Building>,
     /// Folders of the same world with other maps.
     other_maps: Vec<PathBuf>,
-    /// Option files in them by corridor, read when the first option is looked for.
-    elsewhere: OnceLock<BTreeMap<String, PathBuf>>,
+    /// Their options by corridor with their folders, read when the first option is looked for.
+    elsewhere: OnceLock<BTreeMap<String, (PathBuf, OptionFile)>>,
+    /// Intents that a killed process left, and the options in them.
+    left_behind: Vec<PathBuf>,
+    unfinished: BTreeSet<OptionId>,
     /// Changes whenever an option or a building does.
     version: u64,
     /// Options that are to be written by [`OptionLibrary::save`]; `None` where they are written at once.
@@ -158,37 +189,35 @@ impl OptionLibrary {
     /// Returns an error that names the file that is damaged or of another format.
     pub fn open(root: &Path, key: &str) -> Result<Self, FileError> {
         let folder = root.join(key);
-        let (mut options, mut networks) = (BTreeMap::new(), Networks::new());
+        let mut files = BTreeMap::new();
+        // Whoever saves meanwhile has an intent before, or after, or both.
+        let before = read_intents(&folder)?;
         for path in option_files(&folder)? {
-            let file: OptionFile = files::read_ron(&path)?;
-            if file.format != FORMAT {
-                return Err(FileError::content(
-                    &path,
-                    format!("format is {}, expected {FORMAT}", file.format),
-                ));
-            }
-            if path.file_name() != Some(file_name(file.id).as_ref()) {
-                return Err(FileError::content(&path, format!("holds the option {}", file.id)));
-            }
-            options.insert(file.id, load_option(file, &folder, &mut networks)?);
+            let file = read_option(&path)?;
+            files.insert(file.id, file);
         }
+        let after = read_intents(&folder)?;
+        let left_behind: Vec<PathBuf> = after.iter().map(|(path, _)| path.clone()).collect();
+        let unfinished = after.iter().flat_map(|(_, options)| options).map(|file| file.id).collect();
+        files.extend(
+            before.into_iter().chain(after).flat_map(|(_, options)| options).map(|file| (file.id, file)),
+        );
+        let mut networks = Networks::new();
+        let load = |(id, file)| Ok((id, load_option(file, &folder, &mut networks)?));
+        let options = files.into_iter().map(load).collect::<Result<_, FileError>>()?;
         let buildings = read_buildings(&folder)?;
         let other_maps = folders_elsewhere(root, key);
-        Ok(Self { folder: Some(folder), options, buildings, other_maps, ..Self::default() })
+        let folder = Some(folder);
+        Ok(Self { folder, options, buildings, other_maps, left_behind, unfinished, ..Self::default() })
     }
 
-    /// Opens the part of the library at `root` for what `method` learns in `world` under `noise` in the simulator
-    /// called `simulator`. Options learnt in one world say nothing about another.
+    /// Opens the part of the library at `root` for the world that `key` names. Options learnt in one world say nothing
+    /// about another.
     ///
     /// # Errors
     /// Returns an error that names the file that is damaged or of another format.
-    pub fn open_for(
-        root: &Path,
-        world: &World,
-        noise: &NoiseModel,
-        simulator: SimulatorKind,
-        method: &Method,
-    ) -> Result<Self, FileError> {
+    pub fn open_for(root: &Path, key: &LibraryKey<'_>) -> Result<Self, FileError> {
+        let LibraryKey { world, noise, simulator, method, states } = *key;
         let mut conditions = format!("{:?} {noise:?} {} {FORMAT}", world.robot, method.name);
         // The usual simulator is not named, so that libraries from before there was a choice stay valid.
         if simulator != SimulatorKind::Kinematic {
@@ -200,6 +229,9 @@ impl OptionLibrary {
         }
         if let Some(prior) = &world.own_prior {
             conditions += &format!(" {}", files::hash(&prior.to_bytes()));
+        }
+        if !states.is_empty() {
+            conditions += &format!(" {states}");
         }
         let conditions = &files::hash(conditions.as_bytes())[..8];
         let map = &map_hash(&world.grid)[..16];
@@ -226,15 +258,32 @@ impl OptionLibrary {
         Ok(())
     }
 
-    /// Writes what was inserted and is not on disk yet.
+    /// Writes what was inserted and is not on disk yet, all of it or nothing: whoever is killed here leaves a library with
+    /// all these options or with none.
     ///
     /// # Errors
-    /// Returns an error that names the file that could not be written; it and all after it stay unsaved.
+    /// Returns an error that names the file that could not be written; what is not on disk stays unsaved.
     pub fn save(&mut self) -> Result<(), FileError> {
-        while let Some(&id) = self.unsaved.iter().flatten().next() {
-            self.write(id, &self.options[&id])?;
-            self.unsaved.iter_mut().for_each(|unsaved| _ = unsaved.remove(&id));
+        let unsaved: BTreeSet<OptionId> =
+            self.unsaved.iter().flatten().chain(&self.unfinished).copied().collect();
+        if let (Some(folder), true) = (&self.folder, unsaved.len() > 1 || !self.left_behind.is_empty()) {
+            let files = unsaved.iter().map(|&id| option_file(id, &self.options[&id], folder));
+            let intent = IntentFile { format: FORMAT, options: files.collect::<Result<_, _>>()? };
+            let path = intent_path(folder, &intent)?;
+            files::write_ron(&path, &intent)?;
+            // It holds what the older ones hold, or something newer.
+            for older in std::mem::replace(&mut self.left_behind, vec![path]) {
+                files::remove(&older)?;
+            }
         }
+        for id in unsaved {
+            self.write(id, &self.options[&id])?;
+        }
+        for intent in std::mem::take(&mut self.left_behind) {
+            files::remove(&intent)?;
+        }
+        self.unfinished.clear();
+        self.unsaved.iter_mut().for_each(BTreeSet::clear);
         Ok(())
     }
 
@@ -242,8 +291,8 @@ impl OptionLibrary {
     /// cell by cell. Damaged files of other maps are passed over.
     #[must_use]
     pub fn adopt(&self, corridor: &str) -> Option<StoredOption> {
-        let path = self.elsewhere.get_or_init(|| files_in(&self.other_maps)).get(corridor)?;
-        load_option(files::read_ron(path).ok()?, path.parent()?, &mut Networks::new()).ok()
+        let (folder, file) = self.elsewhere.get_or_init(|| files_in(&self.other_maps)).get(corridor)?;
+        load_option(file.clone(), folder, &mut Networks::new()).ok()
     }
 
     /// What is known of the building whose options have this fingerprint.
@@ -340,7 +389,13 @@ impl OptionLibrary {
     pub fn insert(&mut self, id: OptionId, option: StoredOption) -> Result<(), FileError> {
         match &mut self.unsaved {
             Some(unsaved) => _ = unsaved.insert(id),
-            None => self.write(id, &option)?,
+            None => {
+                // An intent that stayed would speak against it.
+                if !self.left_behind.is_empty() {
+                    self.save()?;
+                }
+                self.write(id, &option)?;
+            }
         }
         self.options.insert(id, option);
         self.version += 1;
@@ -349,21 +404,72 @@ impl OptionLibrary {
 
     fn write(&self, id: OptionId, option: &StoredOption) -> Result<(), FileError> {
         if let Some(folder) = &self.folder {
-            let file = OptionFile {
-                format: FORMAT,
-                id,
-                corridor: option.corridor.clone(),
-                guide: option.guide.clone(),
-                policy: PolicyFile::save(&option.learnt.policy, folder)?,
-                verified: option.learnt.estimate.count,
-                mean_time_s: option.learnt.estimate.mean_time_s,
-                env_steps: option.learnt.env_steps,
-                gradient_steps: option.learnt.gradient_steps,
-            };
-            files::write_ron(&folder.join(file_name(id)), &file)?;
+            files::write_ron(&folder.join(file_name(id)), &option_file(id, option, folder)?)?;
         }
         Ok(())
     }
+}
+
+/// The file of `option`, whose weights are written into `folder`.
+fn option_file(id: OptionId, option: &StoredOption, folder: &Path) -> Result<OptionFile, FileError> {
+    Ok(OptionFile {
+        format: FORMAT,
+        id,
+        corridor: option.corridor.clone(),
+        guide: option.guide.clone(),
+        policy: PolicyFile::save(&option.learnt.policy, folder)?,
+        verified: option.learnt.estimate.count,
+        mean_time_s: option.learnt.estimate.mean_time_s,
+        env_steps: option.learnt.env_steps,
+        gradient_steps: option.learnt.gradient_steps,
+    })
+}
+
+/// The option file at `path`.
+fn read_option(path: &Path) -> Result<OptionFile, FileError> {
+    let file: OptionFile = files::read_ron(path)?;
+    check_format(path, file.format)?;
+    if path.file_name() != Some(file_name(file.id).as_ref()) {
+        return Err(FileError::content(path, format!("holds the option {}", file.id)));
+    }
+    Ok(file)
+}
+
+fn check_format(path: &Path, format: u32) -> Result<(), FileError> {
+    let problem = || format!("format is {format}, expected {FORMAT}");
+    if format == FORMAT { Ok(()) } else { Err(FileError::content(path, problem())) }
+}
+
+/// The intents in `folder`, the oldest first.
+fn intent_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    files_named(folder, |name| name.starts_with(INTENT))
+}
+
+/// The intents in `folder`, the oldest first, with their options. Those whose writers end meanwhile are left out.
+fn read_intents(folder: &Path) -> Result<Vec<(PathBuf, Vec<OptionFile>)>, FileError> {
+    let mut intents = Vec::new();
+    for path in intent_files(folder)? {
+        match files::read_ron::<IntentFile>(&path) {
+            Ok(file) => {
+                check_format(&path, file.format)?;
+                intents.push((path, file.options));
+            }
+            Err(_) if !path.exists() => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(intents)
+}
+
+/// Where `intent` is written in `folder`: after those that are there, and apart from those of other writers.
+fn intent_path(folder: &Path, intent: &IntentFile) -> Result<PathBuf, FileError> {
+    let number = |path: &PathBuf| {
+        let name = path.file_name()?.to_str()?.strip_prefix(INTENT)?;
+        name.split('-').next()?.parse::<u32>().ok()
+    };
+    let last = intent_files(folder)?.iter().filter_map(number).max().unwrap_or(0);
+    let text = ron::to_string(intent).map_err(|error| FileError::content(folder, error))?;
+    Ok(folder.join(format!("{INTENT}{:06}-{}.ron", last + 1, &files::hash(text.as_bytes())[..8])))
 }
 
 fn file_name(id: OptionId) -> String {
@@ -444,15 +550,17 @@ fn folders_elsewhere(root: &Path, key: &str) -> Vec<PathBuf> {
     folders
 }
 
-/// The option files in `folders`, by corridor.
-fn files_in(folders: &[PathBuf]) -> BTreeMap<String, PathBuf> {
-    let files = folders.iter().filter_map(|folder| option_files(folder).ok()).flatten();
-    files
-        .filter_map(|path| {
-            let file: OptionFile = files::read_ron(&path).ok()?;
-            (file.format == FORMAT).then_some((file.corridor, path))
-        })
-        .collect()
+/// The options in `folders` by corridor, with their folders. Damaged files are passed over.
+fn files_in(folders: &[PathBuf]) -> BTreeMap<String, (PathBuf, OptionFile)> {
+    let of_folder = |folder: &PathBuf| {
+        let single = option_files(folder).into_iter().flatten().filter_map(|path| read_option(&path).ok());
+        let together = read_intents(folder).into_iter().flatten().flat_map(|(_, options)| options);
+        // What is about to be written stands in for what is there.
+        let newest = single.chain(together).map(|file| (file.id, file)).collect::<BTreeMap<_, _>>();
+        let folder = folder.clone();
+        newest.into_values().map(move |file| (file.corridor.clone(), (folder.clone(), file)))
+    };
+    folders.iter().flat_map(of_folder).collect()
 }
 
 #[cfg(test)]
@@ -561,6 +669,34 @@ mod tests {
         assert!(refused().contains("c_5-6.ron: holds the option c:0-1"), "{}", refused());
         fs::rename(root.path().join("here/c_5-6.ron"), &option).unwrap();
         assert_eq!(OptionLibrary::open(root.path(), "here").unwrap().len(), 2, "all is well again");
+    }
+
+    #[test]
+    fn options_that_are_saved_together_appear_together() {
+        let root = tempfile::tempdir().unwrap();
+        let here = root.path().join("w-1-here");
+        let mut library = OptionLibrary::open(root.path(), "w-1-here").unwrap();
+        library.defer();
+        library.insert(TO_ONE, stored(follower())).unwrap();
+        library.insert(TO_TWO, stored(network())).unwrap();
+        // A folder in the place of the second file ends the saving half-way, as a kill would.
+        fs::create_dir_all(here.join("c_1-2.ron/in_the_way")).unwrap();
+        assert!(library.save().is_err());
+        fs::remove_dir_all(here.join("c_1-2.ron")).unwrap();
+        assert!(here.join("c_0-1.ron").exists() && !here.join("c_1-2.ron").exists(), "half of the files");
+        let corridor = "c".repeat(8);
+        let elsewhere = OptionLibrary::open(root.path(), "w-1-there").unwrap();
+        assert!(elsewhere.adopt(&corridor).is_some(), "another map sees it");
+
+        let mut opened = OptionLibrary::open(root.path(), "w-1-here").unwrap();
+        assert_eq!(opened.len(), 2, "all of them are there");
+        let mut newer = stored(follower());
+        newer.learnt.env_steps = 7;
+        opened.insert(TO_ONE, newer).unwrap();
+        opened.save().unwrap();
+        assert!(intent_files(&here).unwrap().is_empty(), "nothing is left to do");
+        let again = OptionLibrary::open(root.path(), "w-1-here").unwrap();
+        assert_eq!((again.len(), again.get(TO_ONE).unwrap().learnt.env_steps), (2, 7), "the newest");
     }
 
     #[test]

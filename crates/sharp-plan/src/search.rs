@@ -39,8 +39,10 @@ const STATE_NEAR_M: f64 = 0.5;
 const EXPANSIONS: usize = 100_000;
 /// The same for each way out of a tight start.
 const EXPANSIONS_DEPARTING: usize = 5_000;
-/// Episodes in which each way out of a tight start is tried.
-const TRIAL_EPISODES: u32 = 200;
+/// Episodes in which each way out of a tight start is tried; the second where an answer is wanted at once.
+const TRIAL_EPISODES: [u32; 2] = [200, 32];
+/// There, metres of a leg that are driven after the robot has left.
+const TRIAL_M: f64 = 2.5;
 /// A leg from the start that succeeds less often than this, by its price and then when tried, looks for a better way to
 /// begin.
 const LEAVES_WELL: f64 = 0.98;
@@ -65,6 +67,10 @@ pub struct Search<'a> {
     departures: OnceLock<Vec<(Departure, Vec<Pose>)>>,
     /// Under what they are tried; by their prices alone without.
     trials: Option<&'a Conditions>,
+    /// Whether an answer is wanted at once: then they are tried for the first leg that is asked for, until one does well.
+    is_hurried: bool,
+    /// Which of them it was then; `None` for driving at once.
+    chosen: OnceLock<Option<usize>>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Options that are at hand from the beginning, the same for every search of a building.
@@ -129,6 +135,8 @@ impl<'a> Search<'a> {
             is_tight: OnceLock::new(),
             departures: OnceLock::new(),
             trials: None,
+            is_hurried: false,
+            chosen: OnceLock::new(),
             offers_direct: false,
             known: None,
             charges: BTreeMap::new(),
@@ -339,12 +347,20 @@ impl<'a> Search<'a> {
         if !matches!(id, LegId::First(_) | LegId::Direct) {
             return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
         }
+        let again = self.chosen.get().copied().flatten().and_then(|way| self.departures().get(way));
+        if let Some(option) = again.and_then(|way| self.departing(candidate, way)) {
+            return Ok(Arc::new(option));
+        }
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
         let is_tight =
             *self.is_tight.get_or_init(|| is_tight(&self.world.guide_robot(), self.query.start));
         let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
-        if !self.settings.departures || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
+        let is_settled = at_once.is_ok() && self.chosen.get().is_some();
+        if !self.settings.departures || is_settled || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
+        }
+        if self.is_hurried {
+            return self.first_that_leaves(candidate, at_once);
         }
         let mut tried: Vec<_> = at_once.clone().into_iter().map(|option| self.tried(option)).collect();
         if !is_tight && tried.iter().any(|tried| tried.success >= LEAVES_WELL) {
@@ -356,8 +372,35 @@ impl<'a> Search<'a> {
         cheapest.map_or_else(|| at_once.map(Arc::new), |tried| Ok(tried.option))
     }
 
+    /// The leg `candidate` with the first way out of the start that leaves it every time, driving `at_once` before all
+    /// others; the cheapest if each fails at times. The next legs from the start leave it likewise.
+    fn first_that_leaves(
+        &self,
+        candidate: &Candidate,
+        at_once: Result<GuidedOption, NoGuide>,
+    ) -> Result<Arc<GuidedOption>, NoGuide> {
+        let departing = |(number, way)| Some((Some(number), self.departing(candidate, way)?));
+        let begin = at_once.as_ref().ok().map(|option| (None, option.clone()));
+        let ways = begin.into_iter().chain(self.departures().iter().enumerate().filter_map(departing));
+        let mut best: Option<(TriedLeg, Option<usize>)> = None;
+        for (number, option) in ways {
+            let tried = self.tried(option);
+            let is_sure = tried.success >= 1.0;
+            if is_sure || best.as_ref().is_none_or(|(best, _)| tried.cost_s < best.cost_s) {
+                best = Some((tried, number));
+            }
+            if is_sure {
+                break;
+            }
+        }
+        let Some((tried, number)) = best else { return at_once.map(Arc::new) };
+        // Of a plan only one leg begins at the start, so that this is the same every time.
+        let _ = self.chosen.set(number);
+        Ok(tried.option)
+    }
+
     /// How the leg `option` does from the start: by a few episodes where there is a simulator, for a price knows little of
-    /// tight places. The prior drives, and where it fails too often the follower as well.
+    /// tight places. The prior drives, and where it fails too often the follower as well, unless an answer is wanted at once.
     fn tried(&self, option: GuidedOption) -> TriedLeg {
         let option = Arc::new(option);
         let price = self.pricer.price(&option, None);
@@ -367,11 +410,21 @@ impl<'a> Search<'a> {
         };
         let states = InitialStates::exactly(RobotState::at_rest(self.query.start));
         let seed = self.seed.child(&format!("leave {}", option.id), 0);
-        let trial = conditions.monte_carlo(self.world).with_episodes(TRIAL_EPISODES).with_seed(seed);
-        let estimate = |policy| trial.estimate(&[Driver::new(&option, policy, None)], &states);
+        let episodes = TRIAL_EPISODES[usize::from(self.is_hurried)];
+        let trial = conditions.monte_carlo(self.world).with_episodes(episodes).with_seed(seed);
+        let estimate = |policy| {
+            let mut driver = Driver::new(&option, policy, None);
+            if self.is_hurried {
+                driver.link.until_m = option.departure.careful_m + TRIAL_M;
+            }
+            trial.estimate(&[driver], &states)
+        };
         let [prior, follower] = &self.pricer.policies();
         let mut best = estimate(prior);
-        if best.count.rate() < LEAVES_WELL {
+        if self.is_hurried {
+            // What a part of the leg takes says nothing of the time of the whole.
+            best.mean_time_s = f64::INFINITY;
+        } else if best.count.rate() < LEAVES_WELL {
             let other = estimate(follower);
             if cost_s(Some(&other)) < cost_s(Some(&best)) {
                 best = other;
@@ -380,17 +433,25 @@ impl<'a> Search<'a> {
         TriedLeg { cost_s: cost_s(Some(&best)), success: best.count.rate(), option }
     }
 
-    /// From now on ways out of a tight start are tried under `conditions` before one is taken.
+    /// From now on ways out of a tight start are tried under `conditions` before one is taken: all of them for each leg, or,
+    /// in a hurry, for one leg until one does well.
     #[must_use]
-    pub(crate) fn with_trials(self, conditions: &'a Conditions) -> Self {
-        Self { trials: Some(conditions), ..self }
+    pub(crate) fn with_trials(self, conditions: &'a Conditions, is_hurried: bool) -> Self {
+        Self { trials: Some(conditions), is_hurried, ..self }
     }
 
     /// The ways out of the start, where it is a tight place.
     fn departures(&self) -> &[(Departure, Vec<Pose>)] {
         self.departures.get_or_init(|| {
             let robot = &self.world.robot;
-            departures(&self.world.guide_robot(), self.query.start, robot.recovery_reverse_m)
+            let mut ways = departures(&self.world.guide_robot(), self.query.start, robot.recovery_reverse_m);
+            if self.is_hurried {
+                // The first that does well is taken: backing off is quick, a curve that is driven with care is not.
+                ways.sort_by(|(a, _), (b, _)| {
+                    a.careful_m.total_cmp(&b.careful_m).then(a.back_off_m.total_cmp(&b.back_off_m))
+                });
+            }
+            ways
         })
     }
 

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use crate::abstraction::{Abstraction, AbstractionSettings, construct};
 use crate::algorithm::{Outcome, solve_with};
-use crate::building::{BuildingMonitor, BuildingWork, LearningSite, Part, learn_hand_overs, learn_options};
+use crate::building::{BuildingMonitor, BuildingShare, BuildingTask, BuildingWork, LearningSite};
 use crate::conditions::Conditions;
 use crate::files::FileError;
 use crate::known::KnownOptions;
@@ -69,6 +69,17 @@ pub enum SolveError {
         robot: String,
         /// What is wrong.
         source: RbvdError,
+    },
+    /// There is nothing to learn in an area of the map.
+    #[error(
+        "no option has both its ends in the area from ({}, {}) to ({}, {}), of {options} that the building has",
+        area.min.x, area.min.y, area.max.x, area.max.y
+    )]
+    NothingWithin {
+        /// The area.
+        area: Area,
+        /// Options of the whole building.
+        options: usize,
     },
     /// The library cannot be written.
     #[error(transparent)]
@@ -223,26 +234,31 @@ impl Sharp {
         self.known.as_ref().map(|(_, known)| Arc::clone(known)).expect("just made")
     }
 
-    /// Learns the part `part` of all options and hand-overs of the building, or of those `within` an area, that the library
-    /// lacks: first the options, and once all of them are there the hand-overs.
+    /// Learns what the library lacks of the `share` of the building: first the options, and once all of them are there the
+    /// hand-overs.
     ///
     /// # Errors
-    /// If the map has no room for the robot, or the library cannot be written.
+    /// If the map has no room for the robot, no option lies within the area, or the library cannot be written.
     pub fn learn_building(
         &mut self,
-        (within, part): (Option<Area>, Part),
+        share: BuildingShare,
         monitor: &dyn BuildingMonitor,
     ) -> Result<(Roster, BuildingWork), SolveError> {
         let abstraction = self.abstraction(&())?.clone();
         let Self { world, method, conditions, library, seed, .. } = self;
         let site = LearningSite { world, abstraction: &abstraction, method, conditions, seed: *seed };
-        let roster = Roster::new(&site, within);
+        let roster = Roster::new(&site, share.within);
+        if let Some(area) = share.within.filter(|_| roster.options.is_empty() && roster.unguided.is_empty()) {
+            let options = abstraction.options.options().len();
+            return Err(SolveError::NothingWithin { area, options });
+        }
         monitor.planned(roster.options.len(), roster.hand_overs.len());
         let mut work = BuildingWork::default();
         library.save_at_once()?;
-        learn_options((&site, &roster), library, part, monitor, &mut work)?;
+        let task = BuildingTask { site: &site, roster: &roster, share, monitor };
+        task.learn_options(library, &mut work)?;
         if !monitor.should_stop() {
-            learn_hand_overs((&site, &roster), library, part, monitor, &mut work)?;
+            task.learn_hand_overs(library, &mut work)?;
         }
         Ok((roster, work))
     }
@@ -292,7 +308,7 @@ mod tests {
     #[test]
     fn odds_are_composed_of_what_was_learnt_and_hold() {
         let mut sharp = ring();
-        let (roster, work) = sharp.learn_building((None, Part::ALL), &()).expect("in memory");
+        let (roster, work) = sharp.learn_building(BuildingShare::ALL, &()).expect("in memory");
         assert!(work.is_whole && !roster.options.is_empty(), "{work:?}");
         let query = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
         let Answer::Solved(plan) = sharp.solve(query, &()).expect("in memory") else { panic!("a ring") };

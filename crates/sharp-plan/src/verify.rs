@@ -11,6 +11,7 @@ use crate::learn::LearntPolicy;
 use crate::method::Method;
 use crate::odds::{ComposedOdds, PlanPiece, compose};
 use crate::policies::Policies;
+use crate::price::Pricer;
 use crate::problem::PlanningProblem;
 use crate::query::Query;
 
@@ -130,8 +131,26 @@ pub(crate) fn predict(
 ) -> Solution {
     let odds = compose(problem, plan, policies, known);
     note_ends(plan, policies, &odds);
+    composed(problem, plan, policies, odds)
+}
+
+/// `plan` with its `odds`.
+pub(crate) fn composed(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+    odds: ComposedOdds,
+) -> Solution {
+    let PlanningProblem { world, conditions, method, .. } = *problem;
+    let pricer = Pricer::new(world, &conditions.noise, method.search, method.failure_cost_s);
     let planned = |(index, option): (usize, &Arc<GuidedOption>)| {
-        let learnt = policies.learnt(option.id).clone();
+        let mut learnt = policies.learnt(option.id).clone();
+        if !learnt.estimate.mean_time_s.is_finite() {
+            let next = plan.get(index + 1).map(|next| &next.guide);
+            let is_whole = plan.len() == 1;
+            learnt.estimate.mean_time_s =
+                if is_whole { odds.time_s } else { pricer.price(option, next).parts().0 };
+        }
         let is_in = |piece: &&PlanPiece| piece.until > index as f64;
         let piece = odds.pieces.iter().find(is_in).expect("pieces reach the goal");
         PlannedOption {

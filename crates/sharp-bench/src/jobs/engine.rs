@@ -2,6 +2,8 @@
 
 use std::fmt::Debug;
 
+use sharp_plan::BuildingMonitor;
+
 use super::manifest::Manifest;
 use crate::error::BenchError;
 use crate::result::ResultLine;
@@ -30,6 +32,10 @@ pub trait EngineMonitor: Sync {
     fn result(&self, _line: &ResultLine) {}
     /// This many results of the jobs asked for are there: for engines that look from time to time.
     fn results_so_far(&self, _count: usize) {}
+    /// Watches the learning of a building: for engines whose workers are in this process.
+    fn building(&self) -> &dyn BuildingMonitor {
+        &()
+    }
     /// Something that a user wants to know, as where logs are.
     fn message(&self, _text: &str) {}
     /// Asked often; true ends the work as soon as possible. What is finished is kept.

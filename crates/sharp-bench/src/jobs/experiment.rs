@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use sharp_options::OptionKind;
 use sharp_plan::{Method, hash, map_hash};
+use sharp_space::OccupancyGrid;
 
 use super::machine::version;
 use crate::error::BenchError;
@@ -154,11 +155,24 @@ impl Inputs {
     /// # Errors
     /// If one of them cannot be read.
     pub fn read(env: &str, robot: &str, noise: &str, regions: Option<&str>) -> Result<Self, BenchError> {
-        let short = |text: &str| hash(text.as_bytes())[..16].to_owned();
         let map = sharp_maps::load(env, &sharp_maps::LoadOptions::default())?;
+        Self::of(&map.grid, robot, noise, regions)
+    }
+
+    /// The same, where the map was read already.
+    ///
+    /// # Errors
+    /// If one of the others cannot be read.
+    pub(super) fn of(
+        grid: &OccupancyGrid,
+        robot: &str,
+        noise: &str,
+        regions: Option<&str>,
+    ) -> Result<Self, BenchError> {
+        let short = |text: &str| hash(text.as_bytes())[..16].to_owned();
         let regions = regions.filter(|name| !DETECTORS.contains(name)).map(named::read_regions);
         Ok(Self {
-            map: map_hash(&map.grid)[..16].to_owned(),
+            map: map_hash(grid)[..16].to_owned(),
             robot: short(&format!("{:?}", named::robot(robot)?)),
             noise: short(&format!("{:?}", named::noise(noise)?)),
             regions: regions.transpose()?.as_deref().map(short),
@@ -208,11 +222,6 @@ impl Experiment {
     /// # Errors
     /// Names the input that differs.
     pub fn check(&self) -> Result<(), BenchError> {
-        let stale = |what: String, is: &str, planned: &str| BenchError::Stale {
-            what,
-            is: is.to_owned(),
-            planned: planned.to_owned(),
-        };
         if self.version != version() {
             return Err(stale("version and build of sharp".to_owned(), version(), &self.version));
         }
@@ -270,6 +279,11 @@ impl Experiment {
             inputs: Inputs::read("a", "husky", "nominal", None).expect("built in"),
         }
     }
+}
+
+/// `what` is now `is`, and the job was planned for `planned`.
+pub(super) fn stale(what: String, is: &str, planned: &str) -> BenchError {
+    BenchError::Stale { what, is: is.to_owned(), planned: planned.to_owned() }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use sharp_plan::write_atomic;
 
 use super::experiment::Experiment;
+use super::lesson::Lesson;
 use crate::error::BenchError;
 use crate::json::to_json;
 
@@ -29,8 +30,69 @@ pub struct Job {
     pub weight_s: f64,
     /// The call that planned it.
     pub command: String,
-    /// What it measures.
-    pub experiment: Experiment,
+    /// What is done.
+    #[serde(flatten)]
+    pub work: JobWork,
+}
+
+/// What a job does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum JobWork {
+    /// It measures a system.
+    Experiment(Experiment),
+    /// It learns a share of a building.
+    Lesson(Lesson),
+}
+
+impl From<Experiment> for JobWork {
+    fn from(experiment: Experiment) -> Self {
+        Self::Experiment(experiment)
+    }
+}
+
+impl From<Lesson> for JobWork {
+    fn from(lesson: Lesson) -> Self {
+        Self::Lesson(lesson)
+    }
+}
+
+impl JobWork {
+    /// The hash of all that decides its result.
+    #[must_use]
+    pub fn key(&self) -> String {
+        match self {
+            Self::Experiment(experiment) => experiment.key(),
+            Self::Lesson(lesson) => lesson.key(),
+        }
+    }
+
+    /// A name for files.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Experiment(experiment) => experiment.name(),
+            Self::Lesson(lesson) => lesson.name(),
+        }
+    }
+
+    /// Expected processor time, seconds.
+    #[must_use]
+    pub fn weight_s(&self) -> f64 {
+        match self {
+            Self::Experiment(experiment) => experiment.weight_s(),
+            Self::Lesson(lesson) => lesson.weight_s(),
+        }
+    }
+
+    /// The problems that it solves, by number; a lesson has none.
+    #[must_use]
+    pub fn problems(&self) -> &[usize] {
+        match self {
+            Self::Experiment(experiment) => &experiment.problems,
+            Self::Lesson(_) => &[],
+        }
+    }
 }
 
 /// All jobs of one folder.
@@ -68,20 +130,20 @@ impl Manifest {
         Ok(Self { dir: dir.to_owned(), jobs })
     }
 
-    /// Adds those of `experiments` that are not planned yet by the call `command`; returns the whole plan and the
-    /// indices of `experiments`.
+    /// Adds those of `works` that are not planned yet by the call `command`; returns the whole plan and the indices of
+    /// `works`.
     ///
     /// # Errors
     /// Returns an error if the manifest there is broken or cannot be written.
-    pub fn extend(
+    pub fn extend<W: Into<JobWork>>(
         dir: &Path,
-        experiments: Vec<Experiment>,
+        works: Vec<W>,
         command: &str,
     ) -> Result<(Self, Vec<usize>), BenchError> {
         let mut manifest =
             if path(dir).exists() { Self::open(dir)? } else { Self { dir: dir.to_owned(), jobs: vec![] } };
         let planned = manifest.jobs.len();
-        let indices = experiments.into_iter().map(|one| manifest.index_of(one, command)).collect();
+        let indices = works.into_iter().map(|work| manifest.index_of(work.into(), command)).collect();
         if manifest.jobs.len() > planned {
             let text: String = manifest.jobs.iter().map(|job| to_json(job) + "\n").collect();
             write_atomic(&path(dir), text.as_bytes())?;
@@ -89,8 +151,8 @@ impl Manifest {
         Ok((manifest, indices))
     }
 
-    fn index_of(&mut self, experiment: Experiment, command: &str) -> usize {
-        let key = experiment.key();
+    fn index_of(&mut self, work: JobWork, command: &str) -> usize {
+        let key = work.key();
         if let Some(job) = self.jobs.iter().find(|job| job.key == key) {
             return job.index;
         }
@@ -98,11 +160,11 @@ impl Manifest {
         self.jobs.push(Job {
             schema: SCHEMA.to_owned(),
             index,
-            name: experiment.name(),
+            name: work.name(),
             key,
-            weight_s: experiment.weight_s(),
+            weight_s: work.weight_s(),
             command: command.to_owned(),
-            experiment,
+            work,
         });
         index
     }
@@ -125,7 +187,7 @@ fn path(dir: &Path) -> PathBuf {
 
 fn parse(index: usize, line: &str) -> Result<Job, String> {
     let job: Job = serde_json::from_str(line).map_err(|error| error.to_string())?;
-    let (key, name) = (job.experiment.key(), job.experiment.name());
+    let (key, name) = (job.work.key(), job.work.name());
     for (field, is, expected) in [
         ("schema", &*job.schema, SCHEMA),
         ("index", &*job.index.to_string(), &*index.to_string()),

@@ -4,7 +4,8 @@ use std::fs;
 
 use sharp_plan::write_atomic;
 
-use super::manifest::{Job, Manifest};
+use super::lesson::is_done;
+use super::manifest::{Job, JobWork, Manifest};
 use super::step::{Done, UNFINISHED};
 use super::work::steps;
 use crate::error::BenchError;
@@ -46,6 +47,14 @@ pub fn merge(manifest: &Manifest) -> Result<Merged, BenchError> {
 /// The results of `job`, and what is wrong if they are not all there.
 fn collect(manifest: &Manifest, job: &Job) -> (Vec<Done>, Option<BenchError>) {
     let mut results = Vec::new();
+    if let JobWork::Lesson(_) = job.work {
+        let missing = match is_done(&manifest.dir, job) {
+            Ok(true) => None,
+            Ok(false) => Some(BenchError::Missing(0)),
+            Err(error) => Some(error),
+        };
+        return (results, missing.map(|error| job.error(error)));
+    }
     for step in steps(&manifest.dir, job) {
         match step.read() {
             Ok(Some(done)) => results.push(done),
@@ -65,13 +74,16 @@ pub fn unfinished(manifest: &Manifest) -> Vec<usize> {
     manifest.jobs.iter().filter(is_open).map(|job| job.index).collect()
 }
 
-/// Number of results of the jobs `indices` that are there.
+/// Number of results of the jobs `indices` that are there; a lesson that is finished counts as one.
 ///
 /// # Panics
 /// If `manifest` has no such job.
 #[must_use]
 pub fn count_results(manifest: &Manifest, indices: &[usize]) -> usize {
-    let of_job = |job| steps(&manifest.dir, job).filter(|step| step.folder().exists()).count();
+    let of_job = |job: &Job| match job.work {
+        JobWork::Experiment(_) => steps(&manifest.dir, job).filter(|step| step.folder().exists()).count(),
+        JobWork::Lesson(_) => usize::from(is_done(&manifest.dir, job).unwrap_or(false)),
+    };
     indices.iter().map(|&index| of_job(&manifest.jobs[index])).sum()
 }
 

@@ -180,7 +180,7 @@ fn output(command: &mut Command) -> Result<Output, BenchError> {
 
 /// A problem is done whole or again: a task must have time for one, or it would begin it for ever.
 fn check_time(jobs: &[&Job], minutes: u32) -> Result<(), BenchError> {
-    let problem_s = |job: &&&Job| job.weight_s / job.experiment.problems.len().max(1) as f64;
+    let problem_s = |job: &&&Job| job.weight_s / job.work.problems().len().max(1) as f64;
     let Some(longest) = jobs.iter().max_by(|a, b| problem_s(a).total_cmp(&problem_s(b))) else {
         return Ok(());
     };

@@ -13,8 +13,9 @@ use sharp_space::Seed;
 
 use super::engine::EngineMonitor;
 use super::experiment::{Experiment, SharpSettings};
+use super::lesson::run_lesson;
 use super::machine::machine;
-use super::manifest::{Job, Manifest};
+use super::manifest::{Job, JobWork, Manifest};
 use super::step::JobStep;
 use crate::error::BenchError;
 use crate::measure::{BaselineSettings, MeasureMonitor, measure};
@@ -49,10 +50,18 @@ pub enum Ended {
 /// read or written.
 pub fn run_job(manifest: &Manifest, index: usize, monitor: &dyn EngineMonitor) -> Result<Ended, BenchError> {
     let job = manifest.job(index)?;
-    run_steps(&manifest.dir, job, monitor).map_err(|error| job.error(error))
+    let ended = match &job.work {
+        JobWork::Experiment(experiment) => run_steps(&manifest.dir, (job, experiment), monitor),
+        JobWork::Lesson(lesson) => run_lesson(&manifest.dir, (job, lesson), monitor),
+    };
+    ended.map_err(|error| job.error(error))
 }
 
-fn run_steps(dir: &Path, job: &Job, monitor: &dyn EngineMonitor) -> Result<Ended, BenchError> {
+fn run_steps(
+    dir: &Path,
+    (job, experiment): (&Job, &Experiment),
+    monitor: &dyn EngineMonitor,
+) -> Result<Ended, BenchError> {
     let steps: Vec<JobStep<'_>> = steps(dir, job).collect();
     let mut is_checked = false;
     for (index, step) in steps.iter().enumerate() {
@@ -61,10 +70,10 @@ fn run_steps(dir: &Path, job: &Job, monitor: &dyn EngineMonitor) -> Result<Ended
             None if monitor.should_stop() => None,
             None => {
                 if !std::mem::replace(&mut is_checked, true) {
-                    job.experiment.check()?;
+                    experiment.check()?;
                 }
                 let before = index.checked_sub(1).map(|before| &steps[before]);
-                let task = JobTask { step, experiment: &job.experiment, monitor };
+                let task = JobTask { step, experiment, monitor };
                 step.make(before, |folder, library| task.result(folder, library))?
             }
         };
@@ -76,7 +85,7 @@ fn run_steps(dir: &Path, job: &Job, monitor: &dyn EngineMonitor) -> Result<Ended
 
 /// The problems of `job` below `dir`, in order.
 pub(super) fn steps<'a>(dir: &'a Path, job: &'a Job) -> impl Iterator<Item = JobStep<'a>> {
-    job.experiment.problems.iter().map(move |&problem| JobStep { dir, job, problem })
+    job.work.problems().iter().map(move |&problem| JobStep { dir, job, problem })
 }
 
 /// One problem of a job, and who watches.

@@ -6,7 +6,7 @@ use clap::Args;
 use sharp_plan::{Area, Part};
 use sharp_space::Point;
 
-use super::{AbstractionArgs, Learning, MapArgs};
+use super::{AbstractionArgs, EngineName, Learning, MapArgs};
 
 /// Learn every option of a building ahead of time.
 #[derive(Debug, Args)]
@@ -33,8 +33,15 @@ pub(crate) struct Learn {
     /// Only the options whose two ends lie in this rectangle, metres in the map's frame.
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true, value_parser = area)]
     pub(crate) within: Option<Area>,
+    /// Who learns: this process, or a Slurm cluster all nodes of which see the library.
+    #[arg(long, value_enum, default_value_t = EngineName::Local)]
+    pub(crate) engine: EngineName,
+    /// Parts that the work is split into, each done by one thread or task; the result does not depend on it [default: none,
+    /// on Slurm 16].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) jobs: Option<u32>,
     /// Only part I of N of the work, from 0: what one of several processes or tasks of a cluster does (docs/scale.md).
-    #[arg(long, value_name = "I/N", value_parser = part)]
+    #[arg(long, value_name = "I/N", value_parser = part, conflicts_with_all = ["jobs", "engine"])]
     pub(crate) part: Option<Part>,
 }
 

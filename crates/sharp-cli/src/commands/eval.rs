@@ -27,7 +27,7 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
         }
         EngineName::Slurm => Box::new(SlurmEngine { program: program()? }),
     };
-    let results: usize = indices.iter().map(|&index| manifest.jobs[index].experiment.problems.len()).sum();
+    let results: usize = indices.iter().map(|&index| manifest.jobs[index].work.problems().len()).sum();
     let progress = EvalProgress(bar(results as u64, "evaluating"));
     progress.0.enable_steady_tick(Duration::from_millis(500));
     let failed = engine.run(&manifest, &indices, &progress)?;

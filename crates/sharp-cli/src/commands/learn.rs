@@ -3,13 +3,20 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use indicatif::ProgressBar;
-use sharp_bench::{LearnReport, NamedWorld, SolveSettings, Stopwatch, learn};
-use sharp_plan::{BuildingMonitor, HandOver, LearntPolicy, Method, Part, RosterOption};
+use sharp_bench::{
+    Engine, EngineMonitor, LearnReport, LocalEngine, NamedWorld, SlurmEngine, SolveSettings, Stopwatch,
+    learn, learn_by,
+};
+use sharp_plan::{BuildingMonitor, BuildingShare, HandOver, LearntPolicy, Method, Part, RosterOption};
 
-use crate::args::Learn;
+use crate::args::{EngineName, Learn};
+use crate::commands::eval::program;
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::progress::{bar, is_interrupted};
+
+/// Tasks of a cluster where the user names no number.
+const SLURM_PARTS: usize = 16;
 
 pub(crate) fn run(args: &Learn, seed: u64, json: bool) -> Result<Exit, Failure> {
     let stopwatch = Stopwatch::start("learn");
@@ -26,8 +33,16 @@ pub(crate) fn run(args: &Learn, seed: u64, json: bool) -> Result<Exit, Failure> 
         Failure::new("USAGE", "--library is none, expected a folder: what is learnt must be kept somewhere")
     })?;
     let monitor = LearnBar::new();
-    let part = args.part.unwrap_or(Part::ALL);
-    let learnt = learn(&place, &settings, &library, (args.within, part), &monitor);
+    let learnt = match workers(args)? {
+        Some(Workers { engine, parts }) => {
+            learn_by(&*engine, (&place, &settings), &library, (args.within, parts), &monitor)
+        }
+        None => {
+            let share = BuildingShare::part(args.part.unwrap_or(Part::ALL));
+            let share = BuildingShare { within: args.within, ..share };
+            learn(&place, &settings, &library, share, &monitor)
+        }
+    };
     monitor.bar.finish_and_clear();
     let mut learnt = learnt?;
     if let Some(folder) = &args.out {
@@ -43,6 +58,26 @@ pub(crate) fn run(args: &Learn, seed: u64, json: bool) -> Result<Exit, Failure> 
         _ if is_interrupted() => Exit::Interrupted,
         "whole" => Exit::Done,
         _ => Exit::Partial,
+    })
+}
+
+/// Who does the work, and in how many parts.
+struct Workers {
+    engine: Box<dyn Engine>,
+    parts: usize,
+}
+
+/// Who does the work and in how many parts; `None` for this process as a whole.
+fn workers(args: &Learn) -> Result<Option<Workers>, Failure> {
+    let parts = args.jobs.map(|jobs| jobs as usize);
+    Ok(match args.engine {
+        EngineName::Local => {
+            parts.map(|parts| Workers { engine: Box::new(LocalEngine { workers: parts }), parts })
+        }
+        EngineName::Slurm => {
+            let engine = Box::new(SlurmEngine { program: program()? });
+            Some(Workers { engine, parts: parts.unwrap_or(SLURM_PARTS) })
+        }
     })
 }
 
@@ -67,6 +102,24 @@ impl LearnBar {
         let share = 100.0 * successes as f64 / episodes.max(1) as f64;
         self.bar.set_message(format!("{message}, {share:.1} % succeed"));
         self.bar.inc(1);
+    }
+}
+
+impl EngineMonitor for LearnBar {
+    fn building(&self) -> &dyn BuildingMonitor {
+        self
+    }
+
+    fn results_so_far(&self, count: usize) {
+        self.bar.set_message(format!("{count} parts of this round done"));
+    }
+
+    fn message(&self, text: &str) {
+        self.bar.suspend(|| eprintln!("{text}"));
+    }
+
+    fn should_stop(&self) -> bool {
+        is_interrupted()
     }
 }
 
