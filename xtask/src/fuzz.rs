@@ -124,6 +124,7 @@ fn run_target(target: &FuzzTarget, host: &str, seconds: u32) -> anyhow::Result<u
         format!("-max_len={}", 2 * SEED_MAX_BYTES),
         "-print_final_stats=1".to_owned(),
         "-verbosity=0".to_owned(),
+        "-print_funcs=0".to_owned(),
     ]);
     let dictionary = source().join("seeds").join(format!("{}.dict", target.name));
     if dictionary.exists() {
