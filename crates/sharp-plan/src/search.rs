@@ -365,7 +365,8 @@ impl<'a> Search<'a> {
     }
 
     /// The leg `candidate` with the first way out of the start that leaves it every time, driving `at_once` before all
-    /// others; the cheapest if each fails at times. The next legs from the start leave it likewise.
+    /// others; the cheapest if each fails at times. After one that never fails the next legs from the start leave it
+    /// likewise.
     fn first_that_leaves(
         &self,
         candidate: &Candidate,
@@ -375,18 +376,22 @@ impl<'a> Search<'a> {
         let begin = at_once.as_ref().ok().map(|option| (None, Arc::new(option.clone())));
         let ways = begin.into_iter().chain(self.departures().iter().enumerate().filter_map(departing));
         let mut best: Option<(f64, Option<usize>, Arc<GuidedOption>)> = None;
+        let mut is_settled = false;
         for (number, option) in ways {
             let Trial { cost_s, failures } = self.trial(&option);
-            if failures == 0 || best.as_ref().is_none_or(|best| cost_s < best.0) {
+            is_settled = failures == 0;
+            if is_settled || best.as_ref().is_none_or(|best| cost_s < best.0) {
                 best = Some((cost_s, number, option));
             }
-            if failures == 0 {
+            if is_settled {
                 break;
             }
         }
         let Some((_, number, option)) = best else { return at_once.map(Arc::new) };
-        // Of a plan only one leg begins at the start, so that this is the same every time.
-        let _ = self.chosen.set(number);
+        if is_settled {
+            // Of a plan only one leg begins at the start, so that this is the same every time.
+            let _ = self.chosen.set(number);
+        }
         Ok(option)
     }
 
