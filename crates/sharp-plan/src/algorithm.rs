@@ -30,9 +30,9 @@ const ATTEMPTS_MAX: usize = 24;
 const VERIFIED_MAX: usize = 4;
 /// The same where odds are composed.
 const COMPOSED_MAX: usize = 2;
-/// Composed plans that succeed less often than this between their first and last pieces are compared with the direct way:
-/// it takes half of the time of an answer to guide and to drive, and is seldom better where options do well.
-const COMPOSED_WELL: f64 = 0.98;
+/// Composed plans are compared with the direct way if they succeed less often than this as a whole, or between their first
+/// and last pieces: it takes half of the time of an answer to guide and to drive, and is seldom better where they do well.
+const COMPOSED_WELL: [f64; 2] = [0.95, 0.98];
 
 /// How solving ended.
 #[derive(Debug)]
@@ -147,7 +147,7 @@ fn algorithm_1(
             false => verify(problem, &p, &policies),
         };
         verified += 1;
-        if !is_composed || solution.composed.as_ref().is_some_and(fails_on_the_way) {
+        if !is_composed || solution.composed.as_ref().is_some_and(fails_often) {
             most += usize::from(search.offer_direct() && is_composed);
         }
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
@@ -173,10 +173,12 @@ fn algorithm_1(
     })
 }
 
-/// Whether a plan fails too often where its options drive. Who cannot leave the start cannot do so directly either.
-fn fails_on_the_way(odds: &ComposedOdds) -> bool {
+/// Whether a plan fails so often that the direct way may be better.
+fn fails_often(odds: &ComposedOdds) -> bool {
+    let [whole, on_the_way] = COMPOSED_WELL;
     let known = odds.pieces.len().saturating_sub(1);
-    odds.pieces.iter().take(known).skip(1).map(|piece| piece.success).product::<f64>() < COMPOSED_WELL
+    let between = odds.pieces.iter().take(known).skip(1).map(|piece| piece.success);
+    odds.success < whole || between.product::<f64>() < on_the_way
 }
 
 fn names(plan: &[Arc<GuidedOption>]) -> Vec<LegId> {

@@ -373,7 +373,8 @@ impl<'a> Search<'a> {
     }
 
     /// The leg `candidate` with the first way out of the start that leaves it every time, driving `at_once` before all
-    /// others; the cheapest if each fails at times. The next legs from the start leave it likewise.
+    /// others; the cheapest if each fails at times. After one that never fails the next legs from the start leave it
+    /// likewise.
     fn first_that_leaves(
         &self,
         candidate: &Candidate,
@@ -383,19 +384,22 @@ impl<'a> Search<'a> {
         let begin = at_once.as_ref().ok().map(|option| (None, option.clone()));
         let ways = begin.into_iter().chain(self.departures().iter().enumerate().filter_map(departing));
         let mut best: Option<(TriedLeg, Option<usize>)> = None;
+        let mut is_settled = false;
         for (number, option) in ways {
             let tried = self.tried(option);
-            let is_sure = tried.success >= 1.0;
-            if is_sure || best.as_ref().is_none_or(|(best, _)| tried.cost_s < best.cost_s) {
+            is_settled = tried.success >= 1.0;
+            if is_settled || best.as_ref().is_none_or(|(best, _)| tried.cost_s < best.cost_s) {
                 best = Some((tried, number));
             }
-            if is_sure {
+            if is_settled {
                 break;
             }
         }
         let Some((tried, number)) = best else { return at_once.map(Arc::new) };
-        // Of a plan only one leg begins at the start, so that this is the same every time.
-        let _ = self.chosen.set(number);
+        if is_settled {
+            // Of a plan only one leg begins at the start, so that this is the same every time.
+            let _ = self.chosen.set(number);
+        }
         Ok(tried.option)
     }
 
