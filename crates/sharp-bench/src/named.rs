@@ -240,9 +240,8 @@ mod tests {
             warnings: vec![],
             picture: *OccupancyGrid::from_ascii(resolution_m, "...\n...\n...").expect("a drawing").frame(),
         };
-        let cell_m = |resolution_m: f64| {
-            world(&map(resolution_m), RobotModel::husky()).grid.frame().resolution_m
-        };
+        let cell_m =
+            |resolution_m: f64| world(&map(resolution_m), RobotModel::husky()).grid.frame().resolution_m;
         assert_eq!(cell_m(0.5), 0.5, "as wide as the map says");
         assert!((cell_m(1.0) - 1.0 / 3.0).abs() < 1e-12, "half as wide as a Husky: {}", cell_m(1.0));
     }

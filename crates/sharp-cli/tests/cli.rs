@@ -84,7 +84,11 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
         (&["solve", "a", "--problem", "9"], "PROBLEM_UNKNOWN", "1..5"),
         (&["solve", "a", "--problem", "1", "--failure-cost", "NaN"], "USAGE", "--failure-cost is NaN"),
         (&["map", "check", "rooms.yaml", "--robot", "robot.ron"], "ROBOT_INVALID", "robot.ron"),
-        (&["solve", "rooms.yaml", "--start", "2,3,1e6", "--goal", "10,3"], "POSE_INVALID", "the yaw is beyond"),
+        (
+            &["solve", "rooms.yaml", "--start", "2,3,1e6", "--goal", "10,3"],
+            "POSE_INVALID",
+            "the yaw is beyond",
+        ),
         (
             &["solve", "rooms.yaml", "--start", "2,3,0", "--via", "6.05,1", "--goal", "10,3"],
             "GOAL_OCCUPIED",

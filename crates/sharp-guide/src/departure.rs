@@ -67,7 +67,8 @@ pub fn departures(robot: &GuideRobot<'_>, start: Pose, back_off_m: f64) -> Vec<(
 }
 
 fn back_offs(robot: &GuideRobot<'_>, start: Pose, at_once_m: f64) -> Vec<(Departure, Vec<Pose>)> {
-    let distances = BACK_OFFS.into_iter().map(|share| share * at_once_m).filter(|&back_off_m| back_off_m > 0.0);
+    let distances =
+        BACK_OFFS.into_iter().map(|share| share * at_once_m).filter(|&back_off_m| back_off_m > 0.0);
     let ways = distances.map(|back_off_m| {
         let departure = Departure { back_off_m, careful_m: 0.0 };
         (departure, vec![departure.after_back_off(start)])

@@ -53,10 +53,13 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
     let leads_on = |start: Pose| ridge_routes(&robot, start, (query.goal.position, None)).next().is_some();
     let model = &world.robot;
     if leads_on(query.start) {
-        let wanted = "a way leads to the goal, but none was found that arrives there in the heading that is asked for";
+        let wanted =
+            "a way leads to the goal, but none was found that arrives there in the heading that is asked for";
         return asks_heading.then(|| wanted.to_owned());
     }
-    let turned = |i: u32| Pose::at(query.start.position, Heading::new(query.start.heading.radians() + f64::from(i) * TURN_RAD));
+    let turned = |i: u32| {
+        Pose::at(query.start.position, Heading::new(query.start.heading.radians() + f64::from(i) * TURN_RAD))
+    };
     if !(1..HEADINGS).map(turned).any(|start| world.geometry.is_free(start) && leads_on(start)) {
         return None;
     }
@@ -65,7 +68,8 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
     } else {
         format!("its tightest bend has a radius of {:.2} m", model.min_turning_radius_m())
     };
-    let back = if model.recovery_reverse_m > 0.0 { "backing off does not help enough" } else { "it never reverses" };
+    let back =
+        if model.recovery_reverse_m > 0.0 { "backing off does not help enough" } else { "it never reverses" };
     Some(format!(
         "the way to the goal is wide enough, but the {} cannot turn onto it from its heading at the start: {needs}, and {back} \
          (recovery_reverse_m is {:.2})",
@@ -102,7 +106,10 @@ fn is_joined_by_unknown(world: &World, query: &Query) -> bool {
 fn beside(frame: &GridFrame, Cell { row, col }: Cell) -> impl Iterator<Item = Cell> + use<> {
     let (width, height) = (frame.width, frame.height);
     let sides = [(row.wrapping_sub(1), col), (row + 1, col), (row, col.wrapping_sub(1)), (row, col + 1)];
-    sides.into_iter().filter(move |&(row, col)| row < height && col < width).map(|(row, col)| Cell::new(col, row))
+    sides
+        .into_iter()
+        .filter(move |&(row, col)| row < height && col < width)
+        .map(|(row, col)| Cell::new(col, row))
 }
 
 /// A cell with the least clearance on the way to it; the one with the most comes first.
@@ -214,7 +221,9 @@ mod tests {
 
     #[test]
     fn unknown_space_between_two_rooms_is_named() {
-        let row = |row: usize| if matches!(row, 0 | 31) { "#".repeat(61) } else { format!("#{0}?{0}#", ".".repeat(29)) };
+        let row = |row: usize| {
+            if matches!(row, 0 | 31) { "#".repeat(61) } else { format!("#{0}?{0}#", ".".repeat(29)) }
+        };
         let rows: Vec<String> = (0..32).map(row).collect();
         let grid = OccupancyGrid::from_ascii(0.1, &rows.join("\n")).expect("a sound drawing");
         let (_, query) = rooms(0);

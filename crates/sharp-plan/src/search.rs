@@ -198,8 +198,7 @@ impl<'a> Search<'a> {
 
     /// The same, as long as it `may_go_on`; false if it had to stop.
     fn guide_while(&mut self, ids: &[LegId], may_go_on: &(dyn Fn() -> bool + Sync)) -> bool {
-        let guided: Vec<_> =
-            ids.par_iter().filter(|_| may_go_on()).map(|&id| (id, self.guide(id))).collect();
+        let guided: Vec<_> = ids.par_iter().filter(|_| may_go_on()).map(|&id| (id, self.guide(id))).collect();
         let is_whole = guided.len() == ids.len();
         guided.into_iter().for_each(|(id, option)| self.keep(id, option));
         is_whole
@@ -352,8 +351,7 @@ impl<'a> Search<'a> {
             return Ok(Arc::new(option));
         }
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
-        let is_tight =
-            *self.is_tight.get_or_init(|| is_tight(&self.world.guide_robot(), self.query.start));
+        let is_tight = *self.is_tight.get_or_init(|| is_tight(&self.world.guide_robot(), self.query.start));
         let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
         let is_settled = at_once.is_ok() && self.chosen.get().is_some();
         if !self.settings.departures || is_settled || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {

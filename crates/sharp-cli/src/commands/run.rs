@@ -110,7 +110,8 @@ fn map_name(folder: &Path) -> String {
 pub(crate) fn load_tour(folder: &Path) -> Result<Tour, Failure> {
     if !Tour::is_in(folder) {
         let found = if folder.is_dir() { "holds no plan" } else { "is no folder" };
-        let message = format!("{} {found}, expected the folder of a plan that `sharp solve` wrote", folder.display());
+        let message =
+            format!("{} {found}, expected the folder of a plan that `sharp solve` wrote", folder.display());
         return Err(Failure::new("FILE_INVALID", message));
     }
     let map = folder.join("map.yaml");

@@ -37,9 +37,7 @@ pub(crate) fn run(args: &Serve, seed: u64) -> Result<Exit, Failure> {
     }
     answer_lines(|line, number| match line.and_then(|line| parse_serve_line(&line)) {
         Ok(wish) => answer(&mut dispatcher, wish),
-        Err(problem) => {
-            Ok(vec![Failure::new("LINE_INVALID", format!("line {number}: {problem}")).to_json()])
-        }
+        Err(problem) => Ok(vec![Failure::new("LINE_INVALID", format!("line {number}: {problem}")).to_json()]),
     })
 }
 

@@ -85,7 +85,9 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     if is_time_up && report.predicted.is_some() && !is_interrupted() {
         eprintln!("warning: time was up before the search was done, this is the best plan so far");
     }
-    if let Some(folder) = args.out.as_deref().filter(|folder| report.plan_dir.is_none() && Tour::is_in(folder)) {
+    if let Some(folder) =
+        args.out.as_deref().filter(|folder| report.plan_dir.is_none() && Tour::is_in(folder))
+    {
         eprintln!("warning: {} still holds the plan of an earlier solve", folder.display());
     }
     if json {
