@@ -34,6 +34,9 @@ const COMPOSED_MAX: usize = 2;
 /// and last pieces: it takes half of the time of an answer to guide and to drive, and is seldom better where they do well.
 const COMPOSED_WELL: [f64; 2] = [0.95, 0.98];
 
+/// A plan that succeeds less often is no plan, share of runs.
+const LEAST_SUCCESS: f64 = 0.01;
+
 /// How solving ended.
 #[derive(Debug)]
 pub enum Outcome {
@@ -165,9 +168,9 @@ fn algorithm_1(
         let odds = refine(problem, &chosen, &policies, odds);
         best = Some(composed(problem, &chosen, &policies, odds));
     }
-    // 21: return Pi. A plan that never succeeds is none, unless whatever was learnt is to be kept.
+    // 21: return Pi. A plan that hardly ever succeeds is none, unless whatever was learnt is to be kept.
     let keeps_all = method.usable_success == 0.0;
-    Ok(match best.filter(|solution| keeps_all || solution.predicted.successes > 0) {
+    Ok(match best.filter(|solution| keeps_all || solution.predicted.rate() >= LEAST_SUCCESS) {
         Some(solution) => Outcome::Solved(Box::new(solution)),
         None => Outcome::NoPlan(describe(problem, &describe_search(&search))),
     })

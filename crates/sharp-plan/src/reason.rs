@@ -8,13 +8,12 @@ use sharp_guide::ridge_routes;
 use sharp_space::{Cell, GridFrame, Heading, Occupancy, Point, Pose, trig};
 
 use crate::query::Query;
+use crate::search::goal_of;
 
 /// Room beside the outline below which a way counts as narrow for a robot under noise, metres.
 const NARROW_M: f64 = 0.1;
 /// Headings at the start that are tried where none leads on from the robot's own, over a full turn.
 const HEADINGS: u32 = 16;
-/// The angle between two of them, radians.
-const TURN_RAD: f64 = std::f64::consts::TAU / HEADINGS as f64;
 /// Directions in which the width of a place is measured, over half a turn.
 const DIRECTIONS: u32 = 24;
 
@@ -50,15 +49,19 @@ pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
 /// looks another way there would get through, or none to the heading that the goal `asks_heading` for. `None` where they are not.
 pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Option<String> {
     let robot = world.guide_robot();
-    let leads_on = |start: Pose| ridge_routes(&robot, start, (query.goal.position, None)).next().is_some();
+    let goal = goal_of(query.goal, world, None);
+    let end = goal.easiest_end(world.geometry.clearance(), world.robot.footprint.inscribed_radius_m());
+    let leads_on = |start: Pose| ridge_routes(&robot, start, (end, None)).next().is_some();
     let model = &world.robot;
-    if leads_on(query.start) {
-        let wanted =
-            "a way leads to the goal, but none was found that arrives there in the heading that is asked for";
-        return asks_heading.then(|| wanted.to_owned());
+    if goal.contains(query.start.position) || leads_on(query.start) {
+        return asks_heading.then(|| {
+            "the goal can be reached, but no way was found that arrives in the heading that is asked for"
+                .to_owned()
+        });
     }
     let turned = |i: u32| {
-        Pose::at(query.start.position, Heading::new(query.start.heading.radians() + f64::from(i) * TURN_RAD))
+        let turn_rad = f64::from(i) * std::f64::consts::TAU / f64::from(HEADINGS);
+        Pose::at(query.start.position, Heading::new(query.start.heading.radians() + turn_rad))
     };
     if !(1..HEADINGS).map(turned).any(|start| world.geometry.is_free(start) && leads_on(start)) {
         return None;
@@ -68,12 +71,15 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
     } else {
         format!("its tightest bend has a radius of {:.2} m", model.min_turning_radius_m())
     };
-    let back =
-        if model.recovery_reverse_m > 0.0 { "backing off does not help enough" } else { "it never reverses" };
+    let back = match model.recovery_reverse_m {
+        reverse_m if reverse_m > 0.0 => {
+            format!("backing off does not help enough (recovery_reverse_m is {reverse_m:.2})")
+        }
+        _ => "it never reverses (recovery_reverse_m is 0)".to_owned(),
+    };
     Some(format!(
-        "the way to the goal is wide enough, but the {} cannot turn onto it from its heading at the start: {needs}, and {back} \
-         (recovery_reverse_m is {:.2})",
-        model.name, model.recovery_reverse_m
+        "the way to the goal is wide enough, but the {} cannot turn onto it from its heading at the start: {needs}, and {back}",
+        model.name
     ))
 }
 
@@ -217,6 +223,24 @@ mod tests {
         let (world, query) = rooms(0);
         let reason = obstruction(&world, &query).expect("no way");
         assert!(reason.contains("separate parts"), "{reason}");
+    }
+
+    #[test]
+    fn a_robot_that_cannot_turn_round_is_told_so() {
+        // A corridor of 1 m with walls at both ends: a Husky looks at one of them and wants to go to the other.
+        let row = |row: usize| {
+            if (4..14).contains(&row) { format!("#{}#", ".".repeat(78)) } else { "#".repeat(80) }
+        };
+        let rows: Vec<String> = (0..18).map(row).collect();
+        let grid = OccupancyGrid::from_ascii(0.1, &rows.join("\n")).expect("a sound drawing");
+        let world = World::new(grid, RobotModel::husky());
+        let query = |yaw| Query { start: Pose::new(6.0, 0.9, yaw), goal: Pose::new(1.0, 0.9, 0.0) };
+        let reason = unturned(&world, &query(0.0), false).expect("it cannot turn");
+        assert!(reason.contains("cannot turn onto it") && reason.contains("0.60 m of room"), "{reason}");
+        let there = query(std::f64::consts::PI);
+        assert_eq!(unturned(&world, &there, false), None, "it looks the right way");
+        let reason = unturned(&world, &there, true).expect("another heading at the goal");
+        assert!(reason.contains("heading that is asked for"), "{reason}");
     }
 
     #[test]
