@@ -320,7 +320,9 @@ fn a_solve_that_was_killed_begins_anew_and_comes_to_the_same_bytes() {
     if !killed.path().join("plan/solve.json").exists() {
         assert!(solve(killed.path()).status().unwrap().success());
     }
-    let [expected, found] = [&undisturbed, &killed].map(|folder| files_in(folder.path()));
+    let [expected, mut found] = [&undisturbed, &killed].map(|folder| files_in(folder.path()));
+    // Who is killed while it writes leaves the temporary file that nothing reads.
+    found.retain(|path, _| path.extension().is_none_or(|ending| ending != "tmp"));
     assert_eq!(found.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
     assert!(expected.keys().any(|path| path.to_string_lossy().contains("/c_")), "options are kept");
     let other: Vec<_> = found.iter().filter(|(path, bytes)| expected[*path] != **bytes).collect();
