@@ -71,11 +71,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let answer = sharp.solve(*query, &monitor)?;
         times_ms.push(1e3 * began.elapsed().as_secs_f64());
         cpus_ms.push(cpu_ms() - cpu);
-        if std::env::var_os("SLOW").is_some() && cpus_ms[cpus_ms.len() - 1] > 100.0 {
-            println!("{:.0} ms for {query:?}: {:?}", cpus_ms[cpus_ms.len() - 1], monitor.times());
-        }
         let spent = monitor.times();
         let row = [spent.search, spent.guide, spent.learn, spent.verify];
+        if std::env::var_os("SLOW").is_some() {
+            let ends = [query.start, query.goal].map(|pose| {
+                let (at, heading) = (pose.position, pose.heading.radians());
+                format!("{:.3},{:.3},{heading:.3}", at.x, at.y)
+            });
+            let parts = row.map(|seconds| format!("{:.1}", 1e3 * seconds)).join(" + ");
+            println!("{:.1} ms = {parts} for {}", times_ms[times_ms.len() - 1], ends.join(" -> "));
+        }
         phases = std::array::from_fn(|i| phases[i] + row[i]);
         match answer {
             Answer::Solved(plan) => {
