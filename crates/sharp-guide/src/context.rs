@@ -85,8 +85,8 @@ impl<'a> GuideContext<'a> {
     }
 
     /// The way along the ridge of clearance, as points in the grid.
-    pub(crate) fn ridge_way(&self, attempt: &Attempt) -> Option<Vec<Vector>> {
-        self.first_path(&self.mask(attempt.margin_m), attempt.weight).ok()
+    pub(crate) fn ridge_way(&self, attempt: &Attempt) -> Result<Vec<Vector>, NoGuide> {
+        self.first_path(&self.mask(attempt.margin_m), attempt.weight)
     }
 
     /// A guide along `way`.

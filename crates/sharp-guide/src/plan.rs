@@ -23,26 +23,56 @@ pub(crate) fn plan_guide(
     settings: &GuideSettings,
     rng: &mut Stream,
 ) -> Result<GuidePath, NoGuide> {
+    match settings.planner {
+        PlannerKind::ClearanceSearch => {
+            searched_guide(request, robot, settings).or_else(|_| sample_guide(request, robot, settings, rng))
+        }
+        PlannerKind::LearnAndLink => sample_guide(request, robot, settings, rng),
+    }
+}
+
+/// The first part of [`plan_guide`]: along the ridge of clearance, without samples.
+///
+/// # Errors
+/// Says what the last attempt failed of.
+pub(crate) fn searched_guide(
+    request: &GuideRequest<'_>,
+    robot: &GuideRobot<'_>,
+    settings: &GuideSettings,
+) -> Result<GuidePath, NoGuide> {
     let context = GuideContext::new(request, robot, settings);
     context.has_length()?;
-    if settings.planner == PlannerKind::ClearanceSearch {
-        let attempts = attempts(settings, robot.geometry.clearance().frame().resolution_m);
-        // Attempts that differ in the smoothing only share their way, and where one finds none, none does.
-        let mut found: Option<(Attempt, Option<Vec<Vector>>)> = None;
-        for attempt in attempts {
-            let is_same = |(before, way): &(Attempt, Option<Vec<Vector>>)| {
-                before.margin_m == attempt.margin_m && (before.weight == attempt.weight || way.is_none())
-            };
-            if !found.as_ref().is_some_and(is_same) {
-                found = Some((attempt, context.ridge_way(&attempt)));
-            }
-            let way = found.as_ref().and_then(|(_, way)| way.as_deref());
-            let guide = way.and_then(|way| context.ridge_guide(way, &attempt).ok());
-            if let Some(guide) = guide {
-                return Ok(guide);
-            }
+    let mut last = NoGuide::Unreachable;
+    // Attempts that differ in the smoothing only share their way, and where one finds none, none does.
+    let mut found: Option<(Attempt, Result<Vec<Vector>, NoGuide>)> = None;
+    for attempt in attempts(settings, robot.geometry.clearance().frame().resolution_m) {
+        let is_same = |(before, way): &(Attempt, Result<_, _>)| {
+            before.margin_m == attempt.margin_m && (before.weight == attempt.weight || way.is_err())
+        };
+        let (_, way) = match found.take().filter(is_same) {
+            Some(known) => found.insert(known),
+            None => found.insert((attempt, context.ridge_way(&attempt))),
+        };
+        match way.as_deref().map_err(Clone::clone).and_then(|way| context.ridge_guide(way, &attempt)) {
+            Ok(guide) => return Ok(guide),
+            Err(reason) => last = reason,
         }
     }
+    Err(last)
+}
+
+/// The second part of [`plan_guide`]: by samples.
+///
+/// # Errors
+/// If the sampling planner finds nothing within its budget.
+pub(crate) fn sample_guide(
+    request: &GuideRequest<'_>,
+    robot: &GuideRobot<'_>,
+    settings: &GuideSettings,
+    rng: &mut Stream,
+) -> Result<GuidePath, NoGuide> {
+    let context = GuideContext::new(request, robot, settings);
+    context.has_length()?;
     let way = context.least_way()?;
     sampled_guide(&context, &way, rng)
 }

@@ -7,6 +7,7 @@ use sharp_space::{Pose, Stream};
 
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
+use crate::plan::{plan_guide, sample_guide, searched_guide};
 use crate::request::{GuideRequest, NoGuide};
 use crate::settings::{GuideSettings, PlannerKind};
 
@@ -44,16 +45,30 @@ impl GuidePlanner for ClearanceSearch {
         rng: &mut Stream,
     ) -> Result<GuidePath, NoGuide> {
         let settings = GuideSettings { planner: PlannerKind::ClearanceSearch, ..self.settings };
-        if settings.margins {
-            let start = request.start.heading.map(|heading| Pose::at(request.start.position, heading));
-            let unsampled = settings.unsampled();
-            let of = |robot| crate::plan::plan_guide(request, &robot, &unsampled, rng).ok();
-            if let Some(guide) = robot.inflated_at(start).find_map(of) {
-                return Ok(guide);
-            }
-        }
-        crate::plan::plan_guide(request, robot, &settings, rng)
+        let start = request.start.heading.map(|heading| Pose::at(request.start.position, heading));
+        let mut robots = robot.inflated_at(start).filter(|_| settings.margins);
+        let Some(widest) = robots.next() else { return plan_guide(request, robot, &settings, rng) };
+        largest_margin(request, widest, &robots.collect::<Vec<_>>(), &settings)
+            .or_else(|_| sample_guide(request, robot, &settings, rng))
     }
+}
+
+/// The guide of the `widest` robot, or else of the first of `others`, whose margins shrink to none, for which there is one.
+fn largest_margin(
+    request: &GuideRequest<'_>,
+    widest: GuideRobot<'_>,
+    others: &[GuideRobot<'_>],
+    settings: &GuideSettings,
+) -> Result<GuidePath, NoGuide> {
+    let of = |robot: &GuideRobot<'_>| searched_guide(request, robot, settings);
+    let guide = of(&widest);
+    let (Err(_), Some((bare, between))) = (&guide, others.split_last()) else { return guide };
+    let bare = of(bare);
+    // Where the robot itself finds no way, or cannot turn onto it, one with a margin need not search.
+    let is_hopeless =
+        matches!(bare, Err(NoGuide::Start(_) | NoGuide::Goal(_) | NoGuide::Unreachable | NoGuide::LeadIn(_)));
+    let with_margin = (!is_hopeless).then(|| between.iter().find_map(|robot| of(robot).ok())).flatten();
+    with_margin.map_or(bare, Ok)
 }
 
 /// Learn and Link inside the option's cells: the paper's planner.
@@ -71,7 +86,7 @@ impl GuidePlanner for LearnAndLink {
         rng: &mut Stream,
     ) -> Result<GuidePath, NoGuide> {
         let settings = GuideSettings { planner: PlannerKind::LearnAndLink, ..self.settings };
-        crate::plan::plan_guide(request, robot, &settings, rng)
+        plan_guide(request, robot, &settings, rng)
     }
 }
 
