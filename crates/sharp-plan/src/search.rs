@@ -448,9 +448,18 @@ impl<'a> Search<'a> {
             let robot = &self.world.robot;
             let mut ways = departures(&self.world.guide_robot(), self.query.start, robot.recovery_reverse_m);
             if self.is_hurried {
-                // The first that does well is taken: backing off is quick, a curve that is driven with care is not.
-                ways.sort_by(|(a, _), (b, _)| {
-                    a.careful_m.total_cmp(&b.careful_m).then(a.back_off_m.total_cmp(&b.back_off_m))
+                // The first that does well is taken: backing off is quick, a curve that is driven with care is not, and where
+                // the robot can turn it finds onto any guide.
+                let outline_m = robot.footprint.circumscribed_radius_m();
+                let can_turn = |lead: &[Pose]| {
+                    let end = lead.last().map_or(self.query.start, |end| *end);
+                    robot.can_turn_in_place()
+                        && self.world.geometry.clearance().sample(end.position) > outline_m
+                };
+                ways.sort_by(|(a, lead_a), (b, lead_b)| {
+                    let by_turn = can_turn(lead_b).cmp(&can_turn(lead_a));
+                    let by_care = a.careful_m.total_cmp(&b.careful_m);
+                    by_care.then(by_turn).then(a.back_off_m.total_cmp(&b.back_off_m))
                 });
             }
             ways
