@@ -64,7 +64,7 @@ pub(crate) fn searched_guide(
 /// The second part of [`plan_guide`]: by samples.
 ///
 /// # Errors
-/// If the sampling planner finds nothing within its budget.
+/// If the sampling planner finds nothing within its budget, which may be none.
 pub(crate) fn sample_guide(
     request: &GuideRequest<'_>,
     robot: &GuideRobot<'_>,
@@ -73,6 +73,9 @@ pub(crate) fn sample_guide(
 ) -> Result<GuidePath, NoGuide> {
     let context = GuideContext::new(request, robot, settings);
     context.has_length()?;
+    if settings.sampling.budget.iterations == 0 {
+        return Err(NoGuide::Exhausted { iterations: 0 });
+    }
     let way = context.least_way()?;
     sampled_guide(&context, &way, rng)
 }
