@@ -21,7 +21,7 @@ use crate::price::Pricer;
 use crate::problem::PlanningProblem;
 
 /// Runs of a piece that no library has: so many, and where its price or they leave doubts so many more.
-const EPISODES: [u32; 2] = [32, 16];
+const EPISODES: [u32; 2] = [24, 24];
 /// Of the plan that is taken so many more where one of these failed, at least and at most, until the 95 % interval of the
 /// piece is so narrow.
 const MORE: RunBudget = RunBudget { episodes: (32, 192), half_width: 0.03 };
