@@ -225,7 +225,7 @@ fn end_piece(
     PlanPiece { until, success, episodes, time_s, runs: count.episodes }
 }
 
-/// Drives a piece of `plan`, a few times only if its price is trusted and none of them fails.
+/// Drives a piece of `plan`, a few times only if its price is trusted and none of them fails, or if half of them fail.
 fn drive(
     problem: &PlanningProblem<'_>,
     plan: &[Arc<GuidedOption>],
@@ -236,8 +236,10 @@ fn drive(
     let stretch = OwnStretch::new(problem, plan, policies, ends);
     let exactly = |episodes| RunBudget { episodes: (episodes, episodes), half_width: 0.0 };
     let few = stretch.drive(exactly(EPISODES[0]), "few");
-    let is_enough = is_trusted && few.count.failures() == 0;
-    if is_enough { few } else { stretch.drive(exactly(EPISODES[1]), "some").and(&few) }
+    // A piece that fails as often as not is not looked at more closely before its plan is taken.
+    let is_clear =
+        2 * few.count.failures() >= few.count.episodes || (is_trusted && few.count.failures() == 0);
+    if is_clear { few } else { stretch.drive(exactly(EPISODES[1]), "some").and(&few) }
 }
 
 /// A piece of a plan that belongs to this plan alone, with its run-up.

@@ -71,6 +71,8 @@ pub struct Search<'a> {
     is_hurried: bool,
     /// Which of them it was then; `None` for driving at once.
     chosen: OnceLock<Option<usize>>,
+    /// The first of them that was the best for a leg, where none did well.
+    least_bad: OnceLock<Option<usize>>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Options that are at hand from the beginning, the same for every search of a building.
@@ -137,6 +139,7 @@ impl<'a> Search<'a> {
             trials: None,
             is_hurried: false,
             chosen: OnceLock::new(),
+            least_bad: OnceLock::new(),
             offers_direct: false,
             known: None,
             charges: BTreeMap::new(),
@@ -372,7 +375,7 @@ impl<'a> Search<'a> {
 
     /// The leg `candidate` with the first way out of the start that leaves it every time, driving `at_once` before all
     /// others; the cheapest if each fails at times. After one that never fails the next legs from the start leave it
-    /// likewise.
+    /// likewise. The direct way, whose guides take longest, tries no more than the best way of a leg before it.
     fn first_that_leaves(
         &self,
         candidate: &Candidate,
@@ -380,7 +383,10 @@ impl<'a> Search<'a> {
     ) -> Result<Arc<GuidedOption>, NoGuide> {
         let departing = |(number, way)| Some((Some(number), self.departing(candidate, way)?));
         let begin = at_once.as_ref().ok().map(|option| (None, option.clone()));
-        let ways = begin.into_iter().chain(self.departures().iter().enumerate().filter_map(departing));
+        let known = self.least_bad.get().filter(|_| candidate.id() == LegId::Direct);
+        let is_wanted = |number: usize| known.is_none_or(|&known| known == Some(number));
+        let others = self.departures().iter().enumerate().filter(|&(number, _)| is_wanted(number));
+        let ways = begin.into_iter().chain(others.filter_map(departing));
         let mut best: Option<(TriedLeg, Option<usize>)> = None;
         let mut is_settled = false;
         for (number, option) in ways {
@@ -394,10 +400,8 @@ impl<'a> Search<'a> {
             }
         }
         let Some((tried, number)) = best else { return at_once.map(Arc::new) };
-        if is_settled {
-            // Of a plan only one leg begins at the start, so that this is the same every time.
-            let _ = self.chosen.set(number);
-        }
+        // Of a plan only one leg begins at the start, so that this is the same every time.
+        let _ = if is_settled { self.chosen.set(number) } else { self.least_bad.set(number) };
         Ok(tried.option)
     }
 
