@@ -192,7 +192,7 @@ impl<'a> MonteCarlo<'a> {
         let (chain, episode) = (Chain::new(drivers), Episode::new(vehicle, EpisodeRules::default()));
         episodes
             .into_par_iter()
-            .with_min_len(16)
+            .with_min_len(4)
             .map_init(
                 || (chain.clone(), episode.clone()),
                 |(chain, episode), number| run(chain, episode, u64::from(number)),

@@ -209,14 +209,19 @@ fn join(problem: &PlanningProblem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<
     // What is composed must drive as it was measured: a start or goal with little room must not take the safety margin from
     // the options between. So either the whole plan is joined with the full margin, or its options alone.
     let widest = GuideRobot { inflated: &robot.inflated[..robot.inflated.len().min(1)], ..robot };
-    let joined = join_guides(plan.clone(), start, &widest, settings);
+    let is_option = |leg: &Arc<GuidedOption>| leg.id.role() == Role::Option;
+    let whole = || join_guides(plan.clone(), start, &widest, settings);
+    let options = || {
+        let options: Vec<_> = plan.iter().filter(|leg| is_option(leg)).cloned().collect();
+        let start = options.first()?.guide.start();
+        Some(join_guides(options, start, &robot, settings))
+    };
+    let (joined, options) = rayon::join(whole, options);
     if joined.iter().zip(&plan).any(|(joined, alone)| !Arc::ptr_eq(joined, alone)) {
         return joined;
     }
-    let is_option = |leg: &Arc<GuidedOption>| leg.id.role() == Role::Option;
-    let options: Vec<_> = plan.iter().filter(|leg| is_option(leg)).cloned().collect();
-    let Some(start) = options.first().map(|first| first.guide.start()) else { return plan };
-    let mut options = join_guides(options, start, &robot, settings).into_iter();
+    let Some(options) = options else { return plan };
+    let mut options = options.into_iter();
     plan.into_iter().map(|leg| if is_option(&leg) { options.next().unwrap_or(leg) } else { leg }).collect()
 }
 
