@@ -25,7 +25,13 @@ pub(crate) fn plan_guide(
 ) -> Result<GuidePath, NoGuide> {
     match settings.planner {
         PlannerKind::ClearanceSearch => {
-            searched_guide(request, robot, settings).or_else(|_| sample_guide(request, robot, settings, rng))
+            let searched = searched_guide(request, robot, settings);
+            let may_sample = settings.sampling.budget.iterations > 0;
+            if searched.is_ok() || !may_sample {
+                searched
+            } else {
+                sample_guide(request, robot, settings, rng)
+            }
         }
         PlannerKind::LearnAndLink => sample_guide(request, robot, settings, rng),
     }

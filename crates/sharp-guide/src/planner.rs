@@ -64,9 +64,7 @@ fn largest_margin(
     let guide = of(&widest);
     let (Err(_), Some((bare, between))) = (&guide, others.split_last()) else { return guide };
     let bare = of(bare);
-    // Where the robot itself finds no way, or cannot turn onto it, one with a margin need not search.
-    let is_hopeless =
-        matches!(bare, Err(NoGuide::Start(_) | NoGuide::Goal(_) | NoGuide::Unreachable | NoGuide::LeadIn(_)));
+    let is_hopeless = bare.as_ref().is_err_and(NoGuide::is_hopeless);
     let with_margin = (!is_hopeless).then(|| between.iter().find_map(|robot| of(robot).ok())).flatten();
     with_margin.map_or(bare, Ok)
 }

@@ -145,3 +145,11 @@ pub enum NoGuide {
         iterations: usize,
     },
 }
+
+impl NoGuide {
+    /// Whether a robot with a safety margin need not search where the robot itself failed so: it finds no way, or cannot turn
+    /// onto it.
+    pub(crate) const fn is_hopeless(&self) -> bool {
+        matches!(self, Self::Start(_) | Self::Goal(_) | Self::Unreachable | Self::LeadIn(_))
+    }
+}

@@ -11,7 +11,7 @@ use sharp_space::{Heading, Point, Pose, Seed};
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
 use crate::planner::{ClearanceSearch, GuidePlanner};
-use crate::request::{GuideEnd, GuideRequest};
+use crate::request::{GuideEnd, GuideRequest, NoGuide};
 use crate::settings::GuideSettings;
 
 /// A route from `start` to within `goal_radius_m` of `goal` for each safety margin for which there is one, the largest
@@ -28,7 +28,7 @@ pub fn routes<'a>(
     // Where the robot itself finds no way, one with a margin need not search.
     let has_way = OnceCell::new();
     robot.inflated_at(Some(start)).filter_map(move |robot| {
-        ridge(&robot, start, (goal, None)).or_else(|| {
+        ridge(&robot, start, (goal, None)).ok().or_else(|| {
             let has_way = has_way.get_or_init(|| searched(&without_margin, start, goal, &settings).is_some());
             has_way.then(|| searched(&robot, start, goal, &settings)).flatten()
         })
@@ -41,7 +41,20 @@ pub fn ridge_routes<'a>(
     start: Pose,
     (goal, heading): (Point, Option<Heading>),
 ) -> impl Iterator<Item = GuidePath> + use<'a> {
-    robot.inflated_at(Some(start)).filter_map(move |robot| ridge(&robot, start, (goal, heading)))
+    let without_margin = GuideRobot::new(robot.geometry, robot.steering);
+    let is_hopeless = OnceCell::new();
+    robot.inflated_at(Some(start)).filter_map(move |robot| {
+        if is_hopeless.get() == Some(&true) {
+            return None;
+        }
+        let found = ridge(&robot, start, (goal, heading));
+        if found.as_ref().is_err_and(NoGuide::is_hopeless) {
+            let bare =
+                || ridge(&without_margin, start, (goal, heading)).is_err_and(|reason| reason.is_hopeless());
+            is_hopeless.get_or_init(bare);
+        }
+        found.ok()
+    })
 }
 
 /// Along the ridge of clearance.
@@ -49,7 +62,7 @@ fn ridge(
     robot: &GuideRobot<'_>,
     start: Pose,
     (goal, heading): (Point, Option<Heading>),
-) -> Option<GuidePath> {
+) -> Result<GuidePath, NoGuide> {
     let request = GuideRequest {
         start: GuideEnd { position: start.position, heading: Some(start.heading) },
         goal: GuideEnd { position: goal, heading },
@@ -58,7 +71,7 @@ fn ridge(
     // No sampling: hybrid A* finds shorter paths, and finds them always.
     let settings = GuideSettings { margins: false, ..GuideSettings::default().unsampled() };
     let unused = &mut Seed(0).stream("route", 0);
-    ClearanceSearch { settings }.plan(&request, robot, unused).ok()
+    ClearanceSearch { settings }.plan(&request, robot, unused)
 }
 
 /// By hybrid A*.

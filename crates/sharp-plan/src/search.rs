@@ -349,14 +349,17 @@ impl<'a> Search<'a> {
         if !matches!(id, LegId::First(_) | LegId::Direct) {
             return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
         }
-        let again = self.chosen.get().copied().flatten().and_then(|way| self.departures().get(way));
+        // The guides of the direct way take longest: it does as the leg before it, however well that did.
+        let chosen =
+            self.chosen.get().or_else(|| self.least_bad.get().filter(|_| id == LegId::Direct)).copied();
+        let again = chosen.flatten().and_then(|way| self.departures().get(way));
         if let Some(option) = again.and_then(|way| self.departing(candidate, way)) {
             return Ok(Arc::new(option));
         }
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
         let is_tight = *self.is_tight.get_or_init(|| is_tight(&self.world.guide_robot(), self.query.start));
         let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
-        let is_settled = at_once.is_ok() && self.chosen.get().is_some();
+        let is_settled = at_once.is_ok() && chosen.is_some();
         if !self.settings.departures || is_settled || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
         }
@@ -375,7 +378,7 @@ impl<'a> Search<'a> {
 
     /// The leg `candidate` with the first way out of the start that leaves it every time, driving `at_once` before all
     /// others; the cheapest if each fails at times. After one that never fails the next legs from the start leave it
-    /// likewise. The direct way, whose guides take longest, tries no more than the best way of a leg before it.
+    /// likewise.
     fn first_that_leaves(
         &self,
         candidate: &Candidate,
@@ -383,10 +386,7 @@ impl<'a> Search<'a> {
     ) -> Result<Arc<GuidedOption>, NoGuide> {
         let departing = |(number, way)| Some((Some(number), self.departing(candidate, way)?));
         let begin = at_once.as_ref().ok().map(|option| (None, option.clone()));
-        let known = self.least_bad.get().filter(|_| candidate.id() == LegId::Direct);
-        let is_wanted = |number: usize| known.is_none_or(|&known| known == Some(number));
-        let others = self.departures().iter().enumerate().filter(|&(number, _)| is_wanted(number));
-        let ways = begin.into_iter().chain(others.filter_map(departing));
+        let ways = begin.into_iter().chain(self.departures().iter().enumerate().filter_map(departing));
         let mut best: Option<(TriedLeg, Option<usize>)> = None;
         let mut is_settled = false;
         for (number, option) in ways {
