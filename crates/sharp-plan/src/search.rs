@@ -43,6 +43,8 @@ const EXPANSIONS_DEPARTING: usize = 5_000;
 const TRIAL_EPISODES: [u32; 2] = [200, 32];
 /// There, metres of a leg that are driven after the robot has left.
 const TRIAL_M: f64 = 2.5;
+/// Ways out of a tight start that are tried side by side where an answer is wanted at once.
+const WAYS_AT_ONCE: usize = 2;
 /// A leg from the start that succeeds less often than this, by its price and then when tried, looks for a better way to
 /// begin.
 const LEAVES_WELL: f64 = 0.98;
@@ -359,7 +361,7 @@ impl<'a> Search<'a> {
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
         let is_tight = *self.is_tight.get_or_init(|| is_tight(&self.world.guide_robot(), self.query.start));
         let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
-        let is_settled = at_once.is_ok() && chosen.is_some();
+        let is_settled = chosen.is_some() && (at_once.is_ok() || id == LegId::Direct);
         if !self.settings.departures || is_settled || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
         }
@@ -384,13 +386,20 @@ impl<'a> Search<'a> {
         candidate: &Candidate,
         at_once: Result<GuidedOption, NoGuide>,
     ) -> Result<Arc<GuidedOption>, NoGuide> {
-        let departing = |(number, way)| Some((Some(number), self.departing(candidate, way)?));
-        let begin = at_once.as_ref().ok().map(|option| (None, option.clone()));
-        let ways = begin.into_iter().chain(self.departures().iter().enumerate().filter_map(departing));
+        let trying = |number: Option<usize>| {
+            let option = match number {
+                None => at_once.as_ref().ok().cloned(),
+                Some(number) => self.departing(candidate, &self.departures()[number]),
+            };
+            option.map(|option| (self.tried(option), number))
+        };
+        let all: Vec<Option<usize>> = (0..self.departures().len()).map(Some).collect();
         let mut best: Option<(TriedLeg, Option<usize>)> = None;
         let mut is_settled = false;
-        for (number, option) in ways {
-            let tried = self.tried(option);
+        let side_by_side =
+            |ways: &[Option<usize>]| -> Vec<_> { ways.par_iter().map(|&way| trying(way)).collect() };
+        let ways = std::iter::once(&[None][..]).chain(all.chunks(WAYS_AT_ONCE));
+        for (tried, number) in ways.flat_map(side_by_side).flatten() {
             is_settled = tried.success >= 1.0;
             if is_settled || best.as_ref().is_none_or(|(best, _)| tried.cost_s < best.cost_s) {
                 best = Some((tried, number));
