@@ -268,12 +268,12 @@ impl RunReport {
     /// Counts `executions` of `plan`.
     #[must_use]
     pub fn new(plan: &Plan, executions: &[Execution]) -> Self {
-        Self::predicted(plan.solution.predicted, executions)
+        Self::predicted(plan.solution.success(), executions)
     }
 
-    /// Counts `executions` of what succeeded as often as `predicted` says.
+    /// Counts `executions` of what was predicted to have this chance of `success`.
     #[must_use]
-    pub fn predicted(predicted: SuccessCount, executions: &[Execution]) -> Self {
+    pub fn predicted(success: f64, executions: &[Execution]) -> Self {
         let count = sharp_plan::success(executions);
         let ended = |end: EpisodeEnd| executions.iter().filter(|run| run.end == end).count() as u32;
         let sum = |of: fn(&Execution) -> u32| executions.iter().map(of).sum();
@@ -291,7 +291,7 @@ impl RunReport {
             recoveries: sum(|run| run.events.recoveries),
             mean_sim_time_s: mean_of_successes(runs(), |record| record.time_s),
             mean_path_m: mean_of_successes(runs(), |record| record.path_m),
-            predicted_success: predicted.rate(),
+            predicted_success: success,
             decision_us: DecisionTimes::of(runs().map(|(_, record)| record)),
         }
     }

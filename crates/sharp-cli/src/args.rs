@@ -90,6 +90,13 @@ pub(crate) struct MapArgs {
     /// A ROS map YAML, a MovingAI .map, a PNG, PGM or BMP image, or a named map (a, b, ...).
     #[arg(value_name = "MAP")]
     pub(crate) map: String,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+}
+
+/// How to read a map.
+#[derive(Debug, Args)]
+pub(crate) struct ReadingArgs {
     /// Metres a cell, for files that do not say.
     #[arg(long, value_name = "M")]
     pub(crate) resolution: Option<f64>,
@@ -354,9 +361,8 @@ pub(crate) struct Serve {
     /// A library that `sharp learn` filled: goals come as lines, and the first argument is the map.
     #[arg(long, value_name = "DIR")]
     pub(crate) library: Option<PathBuf>,
-    /// With --library: metres a cell, for maps that do not say.
-    #[arg(long, value_name = "M", requires = "library")]
-    pub(crate) resolution: Option<f64>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     #[command(flatten)]
     pub(crate) abstraction: AbstractionArgs,
     /// With --library: none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).

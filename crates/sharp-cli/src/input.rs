@@ -9,20 +9,25 @@ use sharp_plan::Query;
 use sharp_sim::{SimulatorKind, UnknownSimulator};
 use sharp_space::{Point, Pose, trig};
 
-use crate::args::{MapArgs, ProblemArgs, SpeedArgs, Unknown};
+use crate::args::{MapArgs, ProblemArgs, ReadingArgs, SpeedArgs, Unknown};
 use crate::outcome::Failure;
 
 /// Maps of more cells are warned about: 4000 x 4000.
 const LARGE_CELLS: usize = 16_000_000;
 
 /// Reads the map that `args` name, as they want it.
-pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
+pub(crate) fn map(MapArgs { map, reading }: &MapArgs) -> Result<MapFile, Failure> {
+    map_called(map, reading)
+}
+
+/// Reads the map called `name` as `args` want it.
+pub(crate) fn map_called(name: &str, args: &ReadingArgs) -> Result<MapFile, Failure> {
     let options = LoadOptions {
         resolution_m: args.resolution,
         unknown_free: args.unknown == Unknown::Free,
         allow_outside: args.allow_outside,
     };
-    let mut map = load(&args.map, &options)?;
+    let mut map = load(name, &options)?;
     for mask in &args.keepout {
         // Unknown cells of a mask mean nothing, whatever they mean in the map.
         let keepout = load(mask, &LoadOptions { unknown_free: false, ..options })?;
@@ -54,11 +59,11 @@ pub(crate) fn map(args: &MapArgs) -> Result<MapFile, Failure> {
 /// The speed limits that `args` ask for, for a robot with a top speed of `max_speed_mps`.
 pub(crate) fn speed_limits(
     args: &SpeedArgs,
-    map: &MapArgs,
+    reading: &ReadingArgs,
     max_speed_mps: f64,
 ) -> Result<Option<SpeedLimits>, Failure> {
     let Some(path) = &args.speed_mask else { return Ok(None) };
-    let options = LoadOptions { allow_outside: map.allow_outside, ..LoadOptions::default() };
+    let options = LoadOptions { allow_outside: reading.allow_outside, ..LoadOptions::default() };
     let mask = load_values(path, &options)?;
     for warning in &mask.warnings {
         eprintln!("warning: {warning}");

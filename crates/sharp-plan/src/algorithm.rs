@@ -165,7 +165,7 @@ fn algorithm_1(
         }
     }
     if let Some(odds) = best.as_ref().and_then(|best| best.composed.as_ref()) {
-        let odds = refine(problem, &chosen, &policies, odds);
+        let odds = refine(problem, &chosen, &mut policies, odds)?;
         best = Some(composed(problem, &chosen, &policies, odds));
     }
     // 21: return Pi. A plan that hardly ever succeeds is none, unless whatever was learnt is to be kept.

@@ -14,8 +14,10 @@ use sharp_guide::{Departure, GuidePath, GuidedOption, LegId, Role};
 use sharp_sim::RobotState;
 use sharp_space::Seed;
 
+use crate::files::FileError;
 use crate::hand_over::{RUN_UP_M, RunBudget, Stretch};
 use crate::known::KnownOptions;
+use crate::learn::LearntPolicy;
 use crate::policies::Policies;
 use crate::price::Pricer;
 use crate::problem::PlanningProblem;
@@ -169,27 +171,65 @@ fn cuts(plan: &[Arc<GuidedOption>]) -> Vec<(Option<usize>, usize)> {
 }
 
 /// The `odds` of `plan` with more runs of those pieces that no library has and that failed at times: for the plan that is taken.
+/// Where the follower drives its first or last leg better than the prior, it does so from now on.
+///
+/// # Errors
+/// If the library cannot be written.
 pub(crate) fn refine(
     problem: &PlanningProblem<'_>,
     plan: &[Arc<GuidedOption>],
-    policies: &Policies<'_>,
+    policies: &mut Policies<'_>,
     odds: &ComposedOdds,
-) -> ComposedOdds {
+) -> Result<ComposedOdds, FileError> {
+    let known = &*policies;
     let refined = |(piece, ends): (&PlanPiece, (Option<usize>, usize))| {
         // Where no run failed the price counts as well, and both together say enough.
         let is_doubtful = piece.runs > 0 && f64::from(piece.runs) == piece.episodes;
         if !is_doubtful {
-            return *piece;
+            return (*piece, None);
         }
         let count = nearest_count(piece.success, piece.episodes);
         let mean_time_s = if count.successes > 0 { piece.time_s } else { f64::INFINITY };
-        let before = SuccessEstimate { count, mean_time_s };
-        let all = OwnStretch::new(problem, plan, policies, ends).drive(MORE, "more").and(&before);
+        let (mut stretch, mut seen) =
+            (OwnStretch::new(problem, plan, known, ends), SuccessEstimate { count, mean_time_s });
+        let cost_s = |estimate: &SuccessEstimate| estimate.cost_s(problem.method.failure_cost_s);
+        let other = stand_in(problem, plan, known, ends).and_then(|(leg, follower)| {
+            let by_follower = OwnStretch::new(problem, plan, known, ends).with_policy(leg, &follower);
+            let estimate = by_follower.drive(exactly(piece.runs), "follower");
+            (cost_s(&estimate) < cost_s(&seen)).then_some((leg, follower, estimate))
+        });
+        if let Some((leg, follower, estimate)) = &other {
+            (stretch, seen) = (stretch.with_policy(*leg, follower), *estimate);
+        }
+        let all = stretch.drive(MORE, "more").and(&seen);
         let time_s = if all.count.successes >= TIMED_MIN { all.mean_time_s } else { piece.time_s };
         let (success, runs) = (all.count.rate(), all.count.episodes);
-        PlanPiece { success, episodes: f64::from(runs), time_s, runs, ..*piece }
+        (PlanPiece { success, episodes: f64::from(runs), time_s, runs, ..*piece }, other)
     };
-    ComposedOdds::of(odds.pieces.par_iter().zip(cuts(plan)).map(refined).collect())
+    let refined: Vec<_> = odds.pieces.par_iter().zip(cuts(plan)).map(refined).collect();
+    let (pieces, others): (Vec<_>, Vec<_>) = refined.into_iter().unzip();
+    for (leg, follower, estimate) in others.into_iter().flatten() {
+        // The time of a piece is not that of a leg.
+        let estimate = SuccessEstimate { mean_time_s: f64::INFINITY, ..estimate };
+        policies.keep(&plan[leg], LearntPolicy::untrained(follower, estimate), &problem.world.grid)?;
+    }
+    Ok(ComposedOdds::of(pieces))
+}
+
+/// The first or last leg of a piece of `plan`, and the follower that could drive it, if the prior does.
+fn stand_in(
+    problem: &PlanningProblem<'_>,
+    plan: &[Arc<GuidedOption>],
+    policies: &Policies<'_>,
+    (from, to): (Option<usize>, usize),
+) -> Option<(usize, OptionPolicy)> {
+    let leg = if from.is_none() { 0 } else { to.min(plan.len() - 1) };
+    let PlanningProblem { world, method, conditions, .. } = *problem;
+    let [_, follower] =
+        Pricer::new(world, &conditions.noise, method.search, method.failure_cost_s).policies();
+    let LearntPolicy { policy, env_steps, .. } = policies.learnt(plan[leg].id);
+    let is_prior = matches!(policy, OptionPolicy::Network(_)) && *env_steps == 0;
+    (plan[leg].id.role() != Role::Option && is_prior).then_some((leg, follower))
 }
 
 /// The option in whose middle a robot has left the first leg some metres behind, so that it does not matter any more.
@@ -233,7 +273,6 @@ fn drive(
     is_trusted: bool,
 ) -> SuccessEstimate {
     let stretch = OwnStretch::new(problem, plan, policies, ends);
-    let exactly = |episodes| RunBudget { episodes: (episodes, episodes), half_width: 0.0 };
     let few = stretch.drive(exactly(EPISODES[0]), "few");
     // A piece that fails as often as not is not looked at more closely before its plan is taken.
     let is_clear =
@@ -241,9 +280,16 @@ fn drive(
     if is_clear { few } else { stretch.drive(exactly(EPISODES[1]), "some").and(&few) }
 }
 
+/// So many runs, whatever they show.
+const fn exactly(episodes: u32) -> RunBudget {
+    RunBudget { episodes: (episodes, episodes), half_width: 0.0 }
+}
+
 /// A piece of a plan that belongs to this plan alone, with its run-up.
 struct OwnStretch<'a> {
     problem: &'a PlanningProblem<'a>,
+    /// The leg of the plan that it begins with.
+    begin: usize,
     options: Vec<Arc<GuidedOption>>,
     policies: Vec<&'a OptionPolicy>,
     states: InitialStates,
@@ -272,12 +318,18 @@ impl<'a> OwnStretch<'a> {
         };
         let policies = options.iter().map(|leg| &policies.learnt(leg.id).policy).collect();
         let (from_middle_of, to_middle) = (from.map(|cut| cut - begin), to < plan.len());
-        Self { problem, options, policies, states, from_middle_of, to_middle, seed }
+        Self { problem, begin, options, policies, states, from_middle_of, to_middle, seed }
+    }
+
+    /// The same with another policy for leg number `leg` of the plan.
+    fn with_policy(mut self, leg: usize, policy: &'a OptionPolicy) -> Self {
+        self.policies[leg - self.begin] = policy;
+        self
     }
 
     /// What the runs of `budget` show; `name` names their random stream.
     fn drive(&self, budget: RunBudget, name: &str) -> SuccessEstimate {
-        let Self { problem, options, policies, states, from_middle_of, to_middle, seed } = self;
+        let Self { problem, options, policies, states, from_middle_of, to_middle, seed, .. } = self;
         let (from_middle_of, to_middle) = (*from_middle_of, *to_middle);
         let stretch = Stretch { options, policies, from_middle_of, to_middle };
         stretch.drive((problem.world, problem.conditions), states, budget, seed.child(name, 0))

@@ -88,6 +88,15 @@ impl Tour {
         Self { predicted: count, predicted_time_s, ..tour }
     }
 
+    /// The predicted chance of success: composed where the plan was not run, else the share of its runs.
+    #[must_use]
+    pub fn predicted_success(&self) -> f64 {
+        match &self.plans[..] {
+            [plan] => plan.solution.success(),
+            _ => self.predicted.rate(),
+        }
+    }
+
     /// `episodes` of the tour as the project measures them: see [`RunSettings::new`].
     #[must_use]
     pub fn run_settings(&self, episodes: u32, seed: Seed) -> RunSettings {

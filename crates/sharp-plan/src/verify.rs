@@ -58,6 +58,12 @@ impl Solution {
         SuccessEstimate { count: self.predicted, mean_time_s }
     }
 
+    /// The predicted chance of success: composed where the plan was not run, else the share of its runs.
+    #[must_use]
+    pub fn success(&self) -> f64 {
+        self.composed.as_ref().map_or_else(|| self.predicted.rate(), |odds| odds.success)
+    }
+
     /// What a use of the plan is expected to cost, seconds.
     pub(crate) fn cost_s(&self, failure_cost_s: f64) -> f64 {
         match &self.composed {

@@ -15,7 +15,7 @@ use sharp_regions::{
 use sharp_sim::RobotModel;
 use sharp_space::{Detection, DistanceField, OccupancyGrid, Point, Region, Seed};
 
-use crate::args::{MapArgs, RegionsScore, Unknown};
+use crate::args::{ReadingArgs, RegionsScore, Unknown};
 use crate::commands::regions::label_robot;
 use crate::outcome::{Exit, Failure, say, to_json};
 use crate::{input, progress};
@@ -210,15 +210,14 @@ fn at_doors(
     doors: &Path,
     json: bool,
 ) -> Result<Exit, Failure> {
-    let map_args = MapArgs {
-        map: map.to_owned(),
+    let reading = ReadingArgs {
         resolution: None,
         unknown: Unknown::Blocked,
         allow_outside: false,
         keepout: vec![],
         downsample: 1,
     };
-    let loaded = input::map(&map_args)?;
+    let loaded = input::map_called(map, &reading)?;
     let world = World::new(loaded.grid, robot);
     let (regions, source) = match &args.model {
         Some(file) => (with_model(&world, &model(file)?), file.display().to_string()),

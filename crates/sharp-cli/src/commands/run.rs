@@ -50,7 +50,7 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
         tour.run(&settings, &clock_us())
     };
     spinner.finish_and_clear();
-    let report = RunReport::predicted(tour.predicted, &episodes);
+    let report = RunReport::predicted(tour.predicted_success(), &episodes);
     let picture = pictures::tour(&tour, &episodes);
     let has_picture = keep(&args.plan_dir, &picture, &report)?;
     if json {

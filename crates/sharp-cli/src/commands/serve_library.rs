@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 use sharp_bench::{Dispatcher, NamedWorld, ServeLine, SolveSettings, parse_serve_line};
-use sharp_maps::{LoadOptions, load};
 use sharp_plan::Method;
 use sharp_sim::SimulatorKind;
 
 use crate::args::Serve;
+use crate::input;
 use crate::lines::answer_lines;
 use crate::outcome::{Exit, Failure, to_json};
 
@@ -19,7 +19,7 @@ struct Waiting {
 
 pub(crate) fn run(args: &Serve, seed: u64) -> Result<Exit, Failure> {
     let library = args.library.as_deref().expect("asked for");
-    let map = load(&args.place, &LoadOptions { resolution_m: args.resolution, ..LoadOptions::default() })?;
+    let map = input::map_called(&args.place, &args.reading)?;
     let place = NamedWorld::new(&map, &args.abstraction.robot, &args.noise)?;
     let settings = SolveSettings {
         abstraction: args.abstraction.request(),

@@ -32,7 +32,9 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     let map = input::map(&args.map)?;
     let query = input::query(&map, &args.problem)?;
     let mut problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
-    if let Some(limits) = input::speed_limits(&args.speed, &args.map, problem.world.robot.max_speed_mps)? {
+    if let Some(limits) =
+        input::speed_limits(&args.speed, &args.map.reading, problem.world.robot.max_speed_mps)?
+    {
         problem.world = problem.world.with_speed_limits(limits);
     }
     if let Some(file) = &args.prior {
