@@ -5,8 +5,11 @@
 //! they come nearest to those centres. The library keeps the guides as they were planned.
 
 use std::cell::Cell as Memory;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use sharp_options::Endpoint;
+use sharp_rbvd::StateId;
 use sharp_space::{Cell, Heading, Point, Pose};
 
 use crate::guided_option::GuidedOption;
@@ -58,10 +61,13 @@ fn joined(
 ) -> Option<Vec<GuidePath>> {
     let way: Vec<Point> =
         options.iter().flat_map(|option| option.guide.poses().iter().map(|pose| pose.position)).collect();
-    let frame = options[0].states.frame();
+    let states = &*options[0].states;
+    let frame = states.frame();
+    let allowed: BTreeSet<StateId> = options.iter().flat_map(|option| option.allowed.iter().copied()).collect();
+    let sources: Vec<&Endpoint> = options.iter().filter_map(|option| option.source.as_ref()).collect();
     let looked = |cell: Cell| {
-        let pose = Pose::at(frame.center(cell), start.heading);
-        options.iter().any(|option| option.states.state_of(cell).is_some() && option.is_allowed(&pose))
+        let contains = |source: &&Endpoint| source.contains(frame.center(cell), states);
+        states.state_of(cell).is_some_and(|state| allowed.contains(&state) || sources.iter().any(contains))
     };
     // Smoothing looks at the same cells hundreds of times.
     let seen = vec![Memory::new(None); frame.len()];
