@@ -89,32 +89,29 @@ impl<'a> GuideContext<'a> {
         self.first_path(&self.mask(attempt.margin_m), attempt.weight)
     }
 
-    /// A guide along `way`.
-    pub(crate) fn ridge_guide(&self, way: &[Vector], attempt: &Attempt) -> Result<GuidePath, NoGuide> {
-        self.smooth_guide(&self.mask(attempt.margin_m), (way, &[]), attempt)
-    }
-
-    /// Smooths `points` into a path that meets all `discs` (centre and radius, metres), leads the robot onto
-    /// it and checks the result.
-    pub(crate) fn smooth_guide(
+    /// `points` smoothed into a path that meets all `discs` (centre and radius, metres). How the robot steers does not matter.
+    pub(crate) fn draft(
         &self,
-        mask: &TraversableMask<'_>,
         (points, discs): (&[Vector], &[(Point, f64)]),
         attempt: &Attempt,
-    ) -> Result<GuidePath, NoGuide> {
+    ) -> Vec<Point> {
+        let mask = self.mask(attempt.margin_m);
         let (start, mut goal) = (self.request.start, self.request.goal);
         goal.heading = goal.heading.filter(|_| attempt.aim_goal);
         let back: Vec<Vector> = points.iter().rev().copied().collect();
-        let ends = [self.end(mask, &start, points, 1.0), self.end(mask, &goal, &back, -1.0)];
+        let ends = [self.end(&mask, &start, points, 1.0), self.end(&mask, &goal, &back, -1.0)];
         let frame = mask.frame();
         let disc =
             |&(center, radius_m): &(Point, f64)| (frame.to_grid(center), radius_m / frame.resolution_m);
         let discs: Vec<(Vector, f64)> = discs.iter().map(disc).collect();
         let (pull_per_m2, stiffness_m) = (attempt.pull_per_m2, self.settings.stiffness_m);
         let band = BandSettings { pull_per_m2, stiffness_m, ends, discs: &discs };
-        let smooth: Vec<Point> =
-            band::smooth(mask, points, &band).into_iter().map(|point| frame.from_grid(point)).collect();
-        let guide = self.lead_in(self.through(smooth)?)?;
+        band::smooth(&mask, points, &band).into_iter().map(|point| frame.from_grid(point)).collect()
+    }
+
+    /// Leads the robot onto `draft` and checks the result.
+    pub(crate) fn finish(&self, draft: &[Point]) -> Result<GuidePath, NoGuide> {
+        let guide = self.lead_in(self.through(draft)?)?;
         self.check(&guide)?;
         Ok(guide)
     }
@@ -178,7 +175,7 @@ impl<'a> GuideContext<'a> {
     }
 
     /// The guide through `points`, evenly spaced, headings along the direction of travel.
-    pub(crate) fn through(&self, points: Vec<Point>) -> Result<GuidePath, NoGuide> {
+    pub(crate) fn through(&self, points: &[Point]) -> Result<GuidePath, NoGuide> {
         let fine: Vec<Vector> = points.iter().map(|point| point.coords).collect();
         let length_m: f64 = fine.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
         // One segment more than fits, so that every gap stays under the threshold.
@@ -223,7 +220,7 @@ impl<'a> GuideContext<'a> {
             maneuver.poses(CHECK_STEP_M).into_iter().map(|pose| pose.position).collect();
         let rest = (0..guide.poses().len()).filter(|&i| guide.arc_m(i) > arc_m + CHECK_STEP_M);
         points.extend(rest.map(|i| guide.poses()[i].position));
-        self.through(points)
+        self.through(&points)
     }
 
     /// Returns true if the robot can turn in place from `start` to `heading`.

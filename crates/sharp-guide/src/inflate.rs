@@ -52,11 +52,15 @@ pub fn inflated_robots(geometry: &Arc<dyn RobotGeometry>, radius_m: f64) -> Vec<
     if radius_m == 0.0 {
         margins.dedup_by_key(|margin| margin.0);
     }
-    let of = |&(margin_m, bend): &(f64, f64)| InflatedRobot {
-        geometry: geometry.inflated(margin_m),
-        steering: Steering::of(bend * radius_m),
-    };
-    margins.iter().map(of).collect()
+    let mut robots: Vec<InflatedRobot> = Vec::with_capacity(margins.len());
+    for (index, &(margin_m, bend)) in margins.iter().enumerate() {
+        // Robots of one outline share it: what is planned for one holds for the others as far as they steer alike.
+        let same = index.checked_sub(1).filter(|&before| margins[before].0 == margin_m);
+        let geometry =
+            same.map_or_else(|| geometry.inflated(margin_m), |before| Arc::clone(&robots[before].geometry));
+        robots.push(InflatedRobot { geometry, steering: Steering::of(bend * radius_m) });
+    }
+    robots
 }
 
 #[cfg(test)]

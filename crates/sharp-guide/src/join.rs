@@ -63,7 +63,8 @@ fn joined(
         options.iter().flat_map(|option| option.guide.poses().iter().map(|pose| pose.position)).collect();
     let states = &*options[0].states;
     let frame = states.frame();
-    let allowed: BTreeSet<StateId> = options.iter().flat_map(|option| option.allowed.iter().copied()).collect();
+    let allowed: BTreeSet<StateId> =
+        options.iter().flat_map(|option| option.allowed.iter().copied()).collect();
     let sources: Vec<&Endpoint> = options.iter().filter_map(|option| option.source.as_ref()).collect();
     let looked = |cell: Cell| {
         let contains = |source: &&Endpoint| source.contains(frame.center(cell), states);

@@ -1,6 +1,6 @@
 //! Planning of guide paths: search, smooth, lead in, check; sample where that fails.
 
-use sharp_space::{Point, Stream, Vector};
+use sharp_space::{Point, RobotGeometry, Stream, Vector};
 
 use crate::context::{Attempt, GuideContext};
 use crate::inflate::GuideRobot;
@@ -25,7 +25,7 @@ pub(crate) fn plan_guide(
 ) -> Result<GuidePath, NoGuide> {
     match settings.planner {
         PlannerKind::ClearanceSearch => {
-            let searched = searched_guide(request, robot, settings);
+            let searched = searched_guide(request, robot, settings, &mut Drafts::default());
             let may_sample = settings.sampling.budget.iterations > 0;
             if searched.is_ok() || !may_sample {
                 searched
@@ -37,29 +37,57 @@ pub(crate) fn plan_guide(
     }
 }
 
-/// The first part of [`plan_guide`]: along the ridge of clearance, without samples.
+/// Smoothed ways of one request, by outline and attempt: robots that differ in how they steer share them.
+#[derive(Default)]
+pub(crate) struct Drafts<'a>(Vec<(&'a dyn RobotGeometry, usize, Result<Vec<Point>, NoGuide>)>);
+
+impl<'a> Drafts<'a> {
+    /// The draft of attempt `number` for the outline `geometry`, which `make` makes the first time.
+    fn of(
+        &mut self,
+        geometry: &'a dyn RobotGeometry,
+        number: usize,
+        make: impl FnOnce() -> Result<Vec<Point>, NoGuide>,
+    ) -> Result<&[Point], NoGuide> {
+        let is_it = |(of, attempt, _): &(&dyn RobotGeometry, usize, _)| {
+            std::ptr::addr_eq(*of, geometry) && *attempt == number
+        };
+        let index = self.0.iter().position(is_it).unwrap_or_else(|| {
+            self.0.push((geometry, number, make()));
+            self.0.len() - 1
+        });
+        self.0[index].2.as_deref().map_err(Clone::clone)
+    }
+}
+
+/// The first part of [`plan_guide`]: along the ridge of clearance, without samples. `drafts` belong to this request.
 ///
 /// # Errors
 /// Says what the last attempt failed of.
-pub(crate) fn searched_guide(
+pub(crate) fn searched_guide<'a>(
     request: &GuideRequest<'_>,
-    robot: &GuideRobot<'_>,
+    robot: &GuideRobot<'a>,
     settings: &GuideSettings,
+    drafts: &mut Drafts<'a>,
 ) -> Result<GuidePath, NoGuide> {
     let context = GuideContext::new(request, robot, settings);
     context.has_length()?;
     let mut last = NoGuide::Unreachable;
     // Attempts that differ in the smoothing only share their way, and where one finds none, none does.
     let mut found: Option<(Attempt, Result<Vec<Vector>, NoGuide>)> = None;
-    for attempt in attempts(settings, robot.geometry.clearance().frame().resolution_m) {
-        let is_same = |(before, way): &(Attempt, Result<_, _>)| {
-            before.margin_m == attempt.margin_m && (before.weight == attempt.weight || way.is_err())
-        };
-        let (_, way) = match found.take().filter(is_same) {
-            Some(known) => found.insert(known),
-            None => found.insert((attempt, context.ridge_way(&attempt))),
-        };
-        match way.as_deref().map_err(Clone::clone).and_then(|way| context.ridge_guide(way, &attempt)) {
+    let attempts = attempts(settings, robot.geometry.clearance().frame().resolution_m);
+    for (number, attempt) in attempts.into_iter().enumerate() {
+        let draft = drafts.of(robot.geometry, number, || {
+            let is_same = |(before, way): &(Attempt, Result<_, _>)| {
+                before.margin_m == attempt.margin_m && (before.weight == attempt.weight || way.is_err())
+            };
+            let (_, way) = match found.take().filter(is_same) {
+                Some(known) => found.insert(known),
+                None => found.insert((attempt, context.ridge_way(&attempt))),
+            };
+            way.as_ref().map(|way| context.draft((way, &[]), &attempt)).map_err(Clone::clone)
+        });
+        match draft.and_then(|draft| context.finish(draft)) {
             Ok(guide) => return Ok(guide),
             Err(reason) => last = reason,
         }
@@ -103,7 +131,7 @@ pub(crate) fn smooth_guide(
     let points: Vec<Vector> = way.iter().map(|&point| frame.to_grid(point)).collect();
     let mut last = Err(NoGuide::NoLength(request.start.position));
     for attempt in attempts(settings, frame.resolution_m) {
-        last = context.smooth_guide(&context.mask(attempt.margin_m), (&points, discs), &attempt);
+        last = context.finish(&context.draft((&points, discs), &attempt));
         if last.is_ok() {
             break;
         }

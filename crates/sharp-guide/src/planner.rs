@@ -7,7 +7,7 @@ use sharp_space::{Pose, Stream};
 
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
-use crate::plan::{plan_guide, sample_guide, searched_guide};
+use crate::plan::{Drafts, plan_guide, sample_guide, searched_guide};
 use crate::request::{GuideRequest, NoGuide};
 use crate::settings::{GuideSettings, PlannerKind};
 
@@ -54,13 +54,14 @@ impl GuidePlanner for ClearanceSearch {
 }
 
 /// The guide of the `widest` robot, or else of the first of `others`, whose margins shrink to none, for which there is one.
-fn largest_margin(
+fn largest_margin<'a>(
     request: &GuideRequest<'_>,
-    widest: GuideRobot<'_>,
-    others: &[GuideRobot<'_>],
+    widest: GuideRobot<'a>,
+    others: &[GuideRobot<'a>],
     settings: &GuideSettings,
 ) -> Result<GuidePath, NoGuide> {
-    let of = |robot: &GuideRobot<'_>| searched_guide(request, robot, settings);
+    let mut drafts = Drafts::default();
+    let mut of = |robot: &GuideRobot<'a>| searched_guide(request, robot, settings, &mut drafts);
     let guide = of(&widest);
     let (Err(_), Some((bare, between))) = (&guide, others.split_last()) else { return guide };
     let bare = of(bare);

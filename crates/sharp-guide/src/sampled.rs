@@ -34,7 +34,7 @@ pub(crate) fn sampled_guide(
     let points: Vec<Vector> =
         path.resample(0.2).poses().iter().map(|pose| frame.to_grid(pose.position)).collect();
     if points.len() > 1
-        && let Ok(guide) = context.smooth_guide(&mask, (&points, &[]), &attempt)
+        && let Ok(guide) = context.finish(&context.draft((&points, &[]), &attempt))
     {
         return Ok(guide);
     }
