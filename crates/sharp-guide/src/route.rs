@@ -6,11 +6,11 @@
 use std::cell::OnceCell;
 
 use sharp_motion::{Budget, HybridSettings, MotionQuery, Path, Steering, hybrid_astar};
-use sharp_space::{Heading, Point, Pose, Seed};
+use sharp_space::{Heading, Point, Pose};
 
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
-use crate::planner::{ClearanceSearch, GuidePlanner};
+use crate::plan::{Drafts, searched_guide};
 use crate::request::{GuideEnd, GuideRequest, NoGuide};
 use crate::settings::GuideSettings;
 
@@ -26,9 +26,9 @@ pub fn routes<'a>(
     let settings = HybridSettings { budget, goal_radius_m, ..HybridSettings::default() };
     let without_margin = GuideRobot::new(robot.geometry, robot.steering);
     // Where the robot itself finds no way, one with a margin need not search.
-    let has_way = OnceCell::new();
+    let (has_way, mut drafts) = (OnceCell::new(), Drafts::default());
     robot.inflated_at(Some(start)).filter_map(move |robot| {
-        ridge(&robot, start, (goal, None)).ok().or_else(|| {
+        ridge(&robot, start, (goal, None), &mut drafts).ok().or_else(|| {
             let has_way = has_way.get_or_init(|| searched(&without_margin, start, goal, &settings).is_some());
             has_way.then(|| searched(&robot, start, goal, &settings)).flatten()
         })
@@ -42,26 +42,28 @@ pub fn ridge_routes<'a>(
     (goal, heading): (Point, Option<Heading>),
 ) -> impl Iterator<Item = GuidePath> + use<'a> {
     let without_margin = GuideRobot::new(robot.geometry, robot.steering);
-    let is_hopeless = OnceCell::new();
+    let (is_hopeless, mut drafts) = (OnceCell::new(), Drafts::default());
     robot.inflated_at(Some(start)).filter_map(move |robot| {
         if is_hopeless.get() == Some(&true) {
             return None;
         }
-        let found = ridge(&robot, start, (goal, heading));
+        let found = ridge(&robot, start, (goal, heading), &mut drafts);
         if found.as_ref().is_err_and(NoGuide::is_hopeless) {
-            let bare =
-                || ridge(&without_margin, start, (goal, heading)).is_err_and(|reason| reason.is_hopeless());
-            is_hopeless.get_or_init(bare);
+            is_hopeless.get_or_init(|| {
+                let bare = ridge(&without_margin, start, (goal, heading), &mut drafts);
+                bare.is_err_and(|reason| reason.is_hopeless())
+            });
         }
         found.ok()
     })
 }
 
-/// Along the ridge of clearance.
-fn ridge(
-    robot: &GuideRobot<'_>,
+/// Along the ridge of clearance; `drafts` belong to this start and goal.
+fn ridge<'a>(
+    robot: &GuideRobot<'a>,
     start: Pose,
     (goal, heading): (Point, Option<Heading>),
+    drafts: &mut Drafts<'a>,
 ) -> Result<GuidePath, NoGuide> {
     let request = GuideRequest {
         start: GuideEnd { position: start.position, heading: Some(start.heading) },
@@ -69,9 +71,7 @@ fn ridge(
         allowed: &|_| true,
     };
     // No sampling: hybrid A* finds shorter paths, and finds them always.
-    let settings = GuideSettings { margins: false, ..GuideSettings::default().unsampled() };
-    let unused = &mut Seed(0).stream("route", 0);
-    ClearanceSearch { settings }.plan(&request, robot, unused)
+    searched_guide(&request, robot, &GuideSettings::default(), drafts)
 }
 
 /// By hybrid A*.
