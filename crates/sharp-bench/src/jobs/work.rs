@@ -29,8 +29,6 @@ use crate::times::{DecisionTimes, Reuse, SolveTimes};
 
 /// Where everything is driven: walls to push and graze.
 const SIMULATOR: SimulatorKind = SimulatorKind::Planar;
-/// The simulator of learning and verification: not the one that evaluates.
-const TRAINING_SIMULATOR: SimulatorKind = SimulatorKind::Kinematic;
 /// Executions that a prediction is held against: enough to tell one that is three points off from luck.
 const CALIBRATION_EPISODES: u32 = 1000;
 
@@ -164,11 +162,11 @@ impl JobTask<'_> {
                 regions: sharp.regions.clone(),
                 metric: CellMetric::Geodesic,
             },
+            simulator: method.simulator,
             method,
-            simulator: TRAINING_SIMULATOR,
             seed,
         };
-        let mut solved = solve(&problem, &settings, Some(library), &monitor)?;
+        let mut solved = solve(&problem, &settings, Some(library).into(), &monitor)?;
         if self.monitor.should_stop() {
             return Ok(None);
         }
