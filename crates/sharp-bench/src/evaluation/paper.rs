@@ -273,7 +273,7 @@ mod tests {
             "2 of 244 rows are there",
             "Of `a` 2 problems were measured and 2 ended with a plan within 2400 s. Those plans arrive in 60 % of \
              executions with contact allowed, and in 0 % where a contact is a failure.",
-            "| a | husky | interface | 2 of 2 | 300 (0.0) | 60 % (-) | 0 % (-) | 2/6 | 43 % |",
+            "| a | husky | interface | 2 of 2 | 300 (-) | 60 % (-) | 0 % (-) | 2/6 | 43 % |",
             "| a P1 husky interface | solved | 300 | 580 | 2 | 1/3 | 20 k, 20 k | 1 | 12/20 | 0/20 | - | - |",
             "| a P2 husky interface | i:2-3-4 | 3.4 | 20000 | steps | 600 | 65, 10 % |",
             "paper a husky interface P3 P4 P5; ",

@@ -99,18 +99,15 @@ fn groups(paper: &[&PaperLine], fast: &[&PaperLine]) -> String {
     for ((env, robot, options), lines) in grouped(paper) {
         let beside = fast.get(&(env, robot, options)).map_or(&[][..], Vec::as_slice);
         let solved = lines.iter().filter(|line| line.status == "solved").count();
-        let mean_s = |lines: &[&PaperLine]| {
-            lines.iter().map(|line| line.wall_s).sum::<f64>() / lines.len().max(1) as f64
-        };
         let (uses, reused) =
             lines.iter().fold((0, 0), |(a, b), line| (a + line.reuse.uses, b + line.reuse.reused));
         let in_paper = reuse::paper(env, options).map_or("-".to_owned(), percent);
         _ = writeln!(
             text,
-            "| {env} | {robot} | {options} | {solved} of {} | {:.0} ({:.1}) | {} ({}) | {} ({}) | {reused}/{uses} | {in_paper} |",
+            "| {env} | {robot} | {options} | {solved} of {} | {} ({}) | {} ({}) | {} ({}) | {reused}/{uses} | {in_paper} |",
             lines.len(),
-            mean_s(&lines),
-            mean_s(beside),
+            mean_wall(&lines, 0),
+            mean_wall(beside, 1),
             share(&lines, |line| line.with_contact),
             share(beside, |line| line.with_contact),
             share(&lines, |line| line.without_contact),
@@ -118,6 +115,14 @@ fn groups(paper: &[&PaperLine], fast: &[&PaperLine]) -> String {
         );
     }
     text
+}
+
+/// Mean wall time, seconds with so many `decimals`.
+fn mean_wall(lines: &[&PaperLine], decimals: usize) -> String {
+    if lines.is_empty() {
+        return "-".to_owned();
+    }
+    format!("{:.decimals$}", lines.iter().map(|line| line.wall_s).sum::<f64>() / lines.len() as f64)
 }
 
 fn problems(paper: &[&PaperLine], fast: &[&PaperLine]) -> String {
@@ -176,12 +181,12 @@ fn baselines(rrt: &[&PaperLine], sac: &[&PaperLine]) -> String {
     );
     for (system, lines) in [("RRT", rrt), ("flat SAC", sac)] {
         for ((env, robot, _), lines) in grouped(lines) {
-            let mean_s = lines.iter().map(|line| line.wall_s).sum::<f64>() / lines.len() as f64;
             let steps = lines.iter().map(|line| line.env_steps).sum::<u64>();
             _ = writeln!(
                 text,
-                "| {system} | {env} | {robot} | {} | {mean_s:.2} | {} | {} | {} |",
+                "| {system} | {env} | {robot} | {} | {} | {} | {} | {} |",
                 lines.len(),
+                mean_wall(&lines, 2),
                 if steps == 0 { "-".to_owned() } else { steps.to_string() },
                 share(&lines, |line| line.with_contact),
                 share(&lines, |line| line.without_contact),
