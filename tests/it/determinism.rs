@@ -170,7 +170,7 @@ fn a_solve_that_is_ended_within_trainings_goes_on_and_comes_to_the_same_bytes() 
         method: &method,
         states: "",
     };
-    let library = || OptionLibrary::with_trainings(&root, &key);
+    let library = || OptionLibrary::in_memory().with_trainings(&root, &key);
     // Four options take 600 steps each and are evaluated every 300.
     for (steps, kills, threads) in [(150, false, 1), (700, true, 2), (900, false, 2)] {
         let monitor = EndAfter { steps: AtomicI64::new(steps), kills };

@@ -23,7 +23,7 @@ const NOTE: Duration = Duration::from_secs(10);
 const TICKS_PER_S: f64 = 100.0;
 
 /// Everything that the rows of one call share.
-pub(crate) struct Site {
+pub(crate) struct PaperSite {
     /// The `sharp` command.
     pub(crate) program: PathBuf,
     /// Where plans, libraries and trainings lie.
@@ -36,7 +36,7 @@ pub(crate) struct Site {
 }
 
 /// A row as the program names it.
-pub(crate) struct Row<'a>(pub(crate) &'a Value);
+pub(crate) struct NamedRow<'a>(pub(crate) &'a Value);
 
 /// Time taken, seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,12 +46,12 @@ struct Spent {
 }
 
 /// How a command ended.
-struct Ended {
+struct FinishedCall {
     report: Value,
     spent: Spent,
 }
 
-impl Row<'_> {
+impl NamedRow<'_> {
     pub(crate) fn word(&self, key: &str) -> &str {
         self.0[key].as_str().unwrap_or_default()
     }
@@ -76,13 +76,13 @@ impl Row<'_> {
     }
 }
 
-impl Site {
+impl PaperSite {
     /// Whether the library of the problems before `row` is there.
-    pub(crate) fn has_library(&self, row: &Row<'_>) -> bool {
+    pub(crate) fn has_library(&self, row: &NamedRow<'_>) -> bool {
         !row.is_of_sharp() || row.problem() == 1 || self.library(row).exists()
     }
 
-    fn library(&self, row: &Row<'_>) -> PathBuf {
+    fn library(&self, row: &NamedRow<'_>) -> PathBuf {
         self.out.join("libraries").join(row.group())
     }
 
@@ -90,23 +90,25 @@ impl Site {
     ///
     /// # Errors
     /// If a command cannot be started, was interrupted by somebody else, or finds its input broken.
-    pub(crate) fn measure(&self, row: &Row<'_>) -> anyhow::Result<Option<Value>> {
+    pub(crate) fn measure(&self, row: &NamedRow<'_>) -> anyhow::Result<Option<Value>> {
         let folder = self.out.join("rows").join(row.name());
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let line =
             if row.is_of_sharp() { self.of_sharp(row, &folder)? } else { self.of_baseline(row, &folder)? };
-        let _ = fs::remove_file(folder.join("spent.json"));
+        if line.is_some() {
+            let _ = fs::remove_file(folder.join("spent.json"));
+        }
         Ok(line)
     }
 
-    fn of_sharp(&self, row: &Row<'_>, folder: &Path) -> anyhow::Result<Option<Value>> {
+    fn of_sharp(&self, row: &NamedRow<'_>, folder: &Path) -> anyhow::Result<Option<Value>> {
         let (plan, library) = (folder.join("plan"), self.library(row));
         let [plan, library] = [&plan, &library].map(|path| path.display().to_string());
         let problem = row.problem().to_string();
         let mut args = vec!["solve", row.word("env"), "--problem", &problem, "--robot", row.word("robot")];
         args.extend(["--options", row.word("options"), "--learning", row.word("method")]);
         args.extend(["--library", &library, "--out", &plan]);
-        let Some(Ended { report, spent }) = self.run(&args, folder, Some(TIME_LIMIT_S))? else {
+        let Some(FinishedCall { report, spent }) = self.run(&args, folder, Some(TIME_LIMIT_S))? else {
             return Ok(None);
         };
         let mut line = self.line(row, &report, spent, &args);
@@ -117,20 +119,22 @@ impl Site {
         if report["status"] == "solved" {
             for (key, rule) in [("with_contact", "contact"), ("without_contact", "end")] {
                 let args = ["run", &plan, "--episodes", EPISODES, "--recovery", "off", "--collisions", rule];
-                let Some(Ended { report, .. }) = self.run(&args, folder, None)? else { return Ok(None) };
+                let Some(FinishedCall { report, .. }) = self.run(&args, folder, None)? else {
+                    return Ok(None);
+                };
                 line[key] = count(&report);
             }
         }
         Ok(Some(line))
     }
 
-    fn of_baseline(&self, row: &Row<'_>, folder: &Path) -> anyhow::Result<Option<Value>> {
+    fn of_baseline(&self, row: &NamedRow<'_>, folder: &Path) -> anyhow::Result<Option<Value>> {
         let problem = row.problem().to_string();
         let mut args = vec!["baseline", row.word("method"), row.word("env"), "--problem", &problem];
         args.extend(["--robot", row.word("robot"), "--episodes", EPISODES, "--collisions", "contact"]);
         // Whatever one of them began it begins anew: its time does not add up.
         let _ = fs::remove_file(folder.join("spent.json"));
-        let Some(Ended { report, spent }) = self.run(&args, folder, Some(TIME_LIMIT_S))? else {
+        let Some(FinishedCall { report, spent }) = self.run(&args, folder, Some(TIME_LIMIT_S))? else {
             return Ok(None);
         };
         let ready_s = |key: &str| report["time_s"][key].as_f64().unwrap_or_default();
@@ -143,7 +147,7 @@ impl Site {
         if row.word("method") != "sac" {
             let last = args.len() - 1;
             args[last] = "end";
-            let Some(Ended { report, .. }) = self.run(&args, folder, Some(TIME_LIMIT_S))? else {
+            let Some(FinishedCall { report, .. }) = self.run(&args, folder, Some(TIME_LIMIT_S))? else {
                 return Ok(None);
             };
             line["without_contact"] = count(&report);
@@ -151,7 +155,7 @@ impl Site {
         Ok(Some(line))
     }
 
-    fn line(&self, row: &Row<'_>, report: &Value, spent: Spent, args: &[&str]) -> Value {
+    fn line(&self, row: &NamedRow<'_>, report: &Value, spent: Spent, args: &[&str]) -> Value {
         let mut line = row.0.clone();
         line["schema"] = json!("sharp.paper/1");
         line["status"] = report["status"].clone();
@@ -165,7 +169,12 @@ impl Site {
     }
 
     /// Runs `sharp` with `args` under what `limit_s` leaves after earlier attempts; `None` if time was up.
-    fn run(&self, args: &[&str], folder: &Path, limit_s: Option<f64>) -> anyhow::Result<Option<Ended>> {
+    fn run(
+        &self,
+        args: &[&str],
+        folder: &Path,
+        limit_s: Option<f64>,
+    ) -> anyhow::Result<Option<FinishedCall>> {
         let (spent_file, report_file) = (folder.join("spent.json"), folder.join("report.json"));
         let before = limit_s.map_or(Spent::default(), |_| Spent::read(&spent_file));
         let mut command = Command::new(&self.program);
@@ -182,7 +191,7 @@ impl Site {
             Some(0 | 1) if !is_stopped => {
                 let text = fs::read_to_string(&report_file).context("cannot read a report")?;
                 let report = serde_json::from_str(&text).with_context(|| format!("{text:?} is no JSON"))?;
-                Ok(Some(Ended { report, spent }))
+                Ok(Some(FinishedCall { report, spent }))
             }
             _ if is_stopped => Ok(None),
             Some(130) => bail!("interrupted; the same call goes on"),

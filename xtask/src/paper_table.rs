@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail, ensure};
 use serde_json::{Value, json};
 
-use crate::paper_row::{Row, Site, TIME_LIMIT_S};
+use crate::paper_row::{NamedRow, PaperSite, TIME_LIMIT_S};
 use crate::process::{cargo, flag};
 use crate::tree::root;
 
@@ -32,27 +32,27 @@ const FLAT_POLICY_S: f64 = TIME_LIMIT_S + 120.0;
 pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
     let minutes: f64 = flag(args, "--minutes").unwrap_or("0").parse().context("--minutes")?;
     ensure!((0.0..=1e5).contains(&minutes), "--minutes is {minutes}, expected 0 or more");
-    let table = Table::prepare(minutes)?;
+    let table = PaperTable::prepare(minutes)?;
     let rows = table.rows()?;
     if let Some(name) = flag(args, "--trial") {
         return table.trial(&rows, name);
     }
     let only = flag(args, "--only").unwrap_or_default();
-    let chosen: Vec<&Value> = rows.iter().filter(|row| Row(row).name().contains(only)).collect();
-    ensure!(!chosen.is_empty(), "no row's name holds {only:?}; one is {}", Row(&rows[0]).name());
+    let chosen: Vec<&Value> = rows.iter().filter(|row| NamedRow(row).name().contains(only)).collect();
+    ensure!(!chosen.is_empty(), "no row's name holds {only:?}; one is {}", NamedRow(&rows[0]).name());
     let code = table.measure_missing(&chosen)?;
     table.write()?;
     Ok(code)
 }
 
 /// The programs, and where rows are measured.
-struct Table {
-    site: Site,
+struct PaperTable {
+    site: PaperSite,
     /// The example that knows the rows and writes the page.
     writer: PathBuf,
 }
 
-impl Table {
+impl PaperTable {
     fn prepare(minutes: f64) -> anyhow::Result<Self> {
         let build = ["build", "--release", "--workspace", "--bins", "--example", "paper_table"];
         let output = cargo(&build)
@@ -71,7 +71,7 @@ impl Table {
         let program = root().join(&out).join("sharp");
         fs::copy(built("sharp")?, &program).context("cannot copy sharp into out/paper")?;
         std::env::set_current_dir(root()).context("cannot go to the root")?;
-        let site = Site {
+        let site = PaperSite {
             program,
             out,
             deadline: Instant::now() + Duration::from_secs_f64(60.0 * minutes),
@@ -90,25 +90,25 @@ impl Table {
 
     /// Measures those of `rows` that have no line yet, while there is time; 3 if some are left.
     fn measure_missing(&self, rows: &[&Value]) -> anyhow::Result<u8> {
-        let known: Vec<String> = read_lines()?.iter().map(|line| Row(line).name()).collect();
+        let known: Vec<String> = read_lines()?.iter().map(|line| NamedRow(line).name()).collect();
         let missing: Vec<&Value> =
-            rows.iter().copied().filter(|row| !known.contains(&Row(row).name())).collect();
+            rows.iter().copied().filter(|row| !known.contains(&NamedRow(row).name())).collect();
         let mut left = missing.len();
         for together in missing.chunk_by(|a, b| are_measured_together(a, b)) {
             let remaining_s = self.site.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-            let is_flat = Row(together[0]).word("method") == "sac";
+            let is_flat = NamedRow(together[0]).word("method") == "sac";
             if remaining_s == 0.0 || (is_flat && remaining_s < FLAT_POLICY_S) {
                 break;
             }
-            if let Some(row) = together.iter().find(|row| !self.site.has_library(&Row(row))) {
-                let name = Row(row).name();
+            if let Some(row) = together.iter().find(|row| !self.site.has_library(&NamedRow(row))) {
+                let name = NamedRow(row).name();
                 bail!("the library of the problems before {name} is gone: remove their lines from {LINES}");
             }
             let results: Vec<anyhow::Result<Option<Value>>> = std::thread::scope(|scope| {
                 let begin = |row: &&Value| {
                     let row = (*row).clone();
-                    eprintln!("{}, {left} rows left", Row(&row).name());
-                    scope.spawn(move || self.site.measure(&Row(&row)))
+                    eprintln!("{}, {left} rows left", NamedRow(&row).name());
+                    scope.spawn(move || self.site.measure(&NamedRow(&row)))
                 };
                 let running: Vec<_> = together.iter().map(begin).collect();
                 running.into_iter().map(|one| one.join().expect("no panic")).collect()
@@ -126,18 +126,18 @@ impl Table {
 
     /// Measures the row called `name` apart from all others and prints its line.
     fn trial(&self, rows: &[Value], name: &str) -> anyhow::Result<u8> {
-        let row = rows.iter().find(|row| Row(row).name() == name);
-        let row =
-            row.with_context(|| format!("no row is called {name:?}; one is {:?}", Row(&rows[0]).name()))?;
+        let row = rows.iter().find(|row| NamedRow(row).name() == name);
+        let row = row
+            .with_context(|| format!("no row is called {name:?}; one is {:?}", NamedRow(&rows[0]).name()))?;
         let out = self.site.out.join("trial");
-        let site = Site {
+        let site = PaperSite {
             out,
             program: self.site.program.clone(),
             version: self.site.version.clone(),
             machine: self.site.machine.clone(),
             ..self.site
         };
-        match site.measure(&Row(row))? {
+        match site.measure(&NamedRow(row))? {
             Some(line) => println!("{line}"),
             None => {
                 eprintln!("time was up; the same call goes on");
@@ -161,8 +161,8 @@ impl Table {
 
 /// Flat policies of one environment learn on one core each.
 fn are_measured_together(a: &Value, b: &Value) -> bool {
-    let (a, b) = (Row(a), Row(b));
-    let is_flat = |row: &Row<'_>| row.word("method") == "sac";
+    let (a, b) = (NamedRow(a), NamedRow(b));
+    let is_flat = |row: &NamedRow<'_>| row.word("method") == "sac";
     is_flat(&a) && is_flat(&b) && a.word("env") == b.word("env")
 }
 
@@ -190,7 +190,7 @@ fn append(line: &Value) -> anyhow::Result<()> {
 
 fn summary(line: &Value) -> String {
     let count = |key: &str| format!("{} of {}", line[key]["successes"], line[key]["episodes"]);
-    let name = Row(line).name();
+    let name = NamedRow(line).name();
     let (status, wall_s) = (&line["status"], &line["wall_s"]);
     format!(
         "{name}: {status} after {wall_s} s, contact allowed {}, without {}",

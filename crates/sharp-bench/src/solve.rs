@@ -58,7 +58,7 @@ pub struct SolveSettings {
 pub struct SolveFolders<'a> {
     /// The library; without it the solve begins with nothing and keeps nothing.
     pub library: Option<&'a Path>,
-    /// Where trainings are kept while they run, if there is no library ([`Method::keeps_trainings`]).
+    /// Where trainings are kept while they run ([`Method::keeps_trainings`]); `None` for the library's own folder.
     pub trainings: Option<&'a Path>,
 }
 
@@ -202,10 +202,11 @@ impl SolveSettings {
         let states = self.abstraction.states_name();
         let Self { method, simulator, .. } = self;
         let key = LibraryKey { world, noise, simulator: *simulator, method, states: &states };
-        Ok(match folders {
-            SolveFolders { library: Some(root), .. } => OptionLibrary::open_for(root, &key)?,
-            SolveFolders { trainings: Some(root), .. } => OptionLibrary::with_trainings(root, &key),
-            _ => OptionLibrary::in_memory(),
+        let opened = |root| OptionLibrary::open_for(root, &key);
+        let library = folders.library.map_or_else(|| Ok(OptionLibrary::in_memory()), opened)?;
+        Ok(match folders.trainings {
+            Some(root) => library.with_trainings(root, &key),
+            None => library,
         })
     }
 }

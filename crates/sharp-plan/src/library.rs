@@ -260,12 +260,12 @@ impl OptionLibrary {
         Ok(library)
     }
 
-    /// A library that lives as long as the process, while its trainings are kept below `root` in a folder of the world that
-    /// `key` names.
+    /// The same, while its trainings are kept below `root` in a folder of the world that `key` names. Otherwise those of a
+    /// library that was [opened](Self::open_for) lie beside its options, and those of one in memory are not kept.
     #[must_use]
-    pub fn with_trainings(root: &Path, key: &LibraryKey<'_>) -> Self {
+    pub fn with_trainings(self, root: &Path, key: &LibraryKey<'_>) -> Self {
         let trainings = key.method.keeps_trainings.then(|| root.join(key.folder_name()));
-        Self { trainings, ..Self::default() }
+        Self { trainings, ..self }
     }
 
     /// Where trainings are kept while they run.

@@ -23,7 +23,7 @@ use crate::named::NamedProblem;
 use crate::pictures;
 use crate::reports::{BaselineReport, RunReport, SolveReport};
 use crate::result::ResultLine;
-use crate::solve::{AbstractionRequest, SolveSettings, solve};
+use crate::solve::{AbstractionRequest, SolveFolders, SolveSettings, solve};
 use crate::stopwatch::{Stopwatch, TimedMonitor, clock_us};
 use crate::times::{DecisionTimes, Reuse, SolveTimes};
 
@@ -166,15 +166,17 @@ impl JobTask<'_> {
             method,
             seed,
         };
-        let mut solved = solve(&problem, &settings, Some(library).into(), &monitor)?;
+        // They outlive the folder of an attempt.
+        let trainings = self.step.folder().with_extension("training");
+        let folders = SolveFolders { library: Some(library), trainings: Some(&trainings) };
+        let mut solved = solve(&problem, &settings, folders, &monitor)?;
         if self.monitor.should_stop() {
             return Ok(None);
         }
         let mut line = with_solution(self.blank(), &solved.report);
         // The folder gets its name when the step is done.
         solved.write(folder, &self.step.folder())?;
-        solved.save_library()?;
-        if let Some(plan) = solved.plan {
+        if let Some(plan) = solved.plan.take() {
             let plan = Arc::new(plan);
             let mut stopwatch = Stopwatch::start("drive");
             let run = drive(
@@ -189,6 +191,7 @@ impl JobTask<'_> {
                 run_settings(&plan, sharp, CALIBRATION_EPISODES, Seed(seed).child("calibration", 0));
             line.calibration = Some(sharp_plan::success(&run_plan(&plan, &settings, &|| 0.0)));
         }
+        solved.save_library()?;
         Ok(Some(line))
     }
 

@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
         input::check_out("--show", folder)?;
     }
     let library = input::library(args.library.as_deref());
-    let trainings = args.out.as_deref().map(|folder| folder.join(TRAININGS));
+    let trainings = args.out.as_deref().filter(|_| library.is_none()).map(|folder| folder.join(TRAININGS));
     let folders = SolveFolders { library: library.as_deref(), trainings: trainings.as_deref() };
 
     let vias = args.via.iter().map(|via| input::pose("--via", via, HeadingRule::Free));

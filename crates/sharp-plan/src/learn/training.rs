@@ -64,7 +64,7 @@ pub struct InterruptedTraining {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
+struct TrainingHeader {
     format: u32,
     fingerprint: String,
     state: TrainingState,
@@ -161,7 +161,7 @@ impl TrainingFile {
     }
 
     fn write(&self, state: TrainingState, rest: &[u8]) -> Result<(), FileError> {
-        let header = Header { format: FORMAT, fingerprint: self.fingerprint.clone(), state };
+        let header = TrainingHeader { format: FORMAT, fingerprint: self.fingerprint.clone(), state };
         let text = ron::to_string(&header).map_err(|error| FileError::content(&self.path, error))?;
         files::write_under_checksum(&self.path, &[text.as_bytes(), b"\n", rest].concat())
     }
@@ -174,7 +174,7 @@ impl TrainingFile {
         let broken = |problem: &str| FileError::content(&self.path, problem);
         let end = bytes.iter().position(|&byte| byte == b'\n').ok_or_else(|| broken("has no header"))?;
         let text = std::str::from_utf8(&bytes[..end]).map_err(|error| broken(&error.to_string()))?;
-        let header: Header = ron::from_str(text).map_err(|error| broken(&error.to_string()))?;
+        let header: TrainingHeader = ron::from_str(text).map_err(|error| broken(&error.to_string()))?;
         if header.format != FORMAT {
             return Err(broken(&format!("format is {}, expected {FORMAT}", header.format)));
         }
