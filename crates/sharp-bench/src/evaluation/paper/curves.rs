@@ -18,12 +18,12 @@ const MOST: u64 = 150_000;
 
 /// One panel a robot and kind of option; `None` where nothing was trained.
 pub(super) fn figure(lines: &[&PaperLine]) -> Option<Figure> {
-    let mut lines: Vec<&&PaperLine> =
-        lines.iter().filter(|line| line.row.method == "paper" && line.trained().next().is_some()).collect();
+    let is_trained = |line: &&PaperLine| line.row.method == "paper" && line.trained().next().is_some();
+    let mut lines: Vec<&PaperLine> = lines.iter().copied().filter(is_trained).collect();
     lines.sort_by_key(|line| (&line.row.robot, &line.row.options));
     let same =
-        |a: &&&PaperLine, b: &&&PaperLine| (&a.row.robot, &a.row.options) == (&b.row.robot, &b.row.options);
-    let panels: Vec<Panel> = lines.chunk_by(|a, b| same(&a, &b)).map(panel).collect();
+        |a: &&PaperLine, b: &&PaperLine| (&a.row.robot, &a.row.options) == (&b.row.robot, &b.row.options);
+    let panels: Vec<Panel> = lines.chunk_by(same).map(panel).collect();
     let kinds = lines.iter().map(|line| line.row.options.as_str());
     (!panels.is_empty()).then(|| Figure {
         name: "paper-curves",
@@ -35,7 +35,7 @@ pub(super) fn figure(lines: &[&PaperLine]) -> Option<Figure> {
     })
 }
 
-fn panel(lines: &[&&PaperLine]) -> Panel {
+fn panel(lines: &[&PaperLine]) -> Panel {
     let row = &lines[0].row;
     let legs: Vec<&PaperLeg> =
         lines.iter().flat_map(|line| line.trained()).filter(|leg| !leg.curve.is_empty()).collect();
