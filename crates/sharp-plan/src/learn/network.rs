@@ -15,6 +15,10 @@ use super::{
     TrainingPoint,
 };
 
+/// A training is kept after every evaluation, and where evaluations are rare after so many steps: ten seconds of the paper's
+/// mode.
+const SAVE_EVERY: u64 = 2_000;
+
 /// How a network is trained.
 #[derive(Clone, Debug)]
 pub(crate) struct NetworkTraining<'a> {
@@ -44,7 +48,7 @@ pub(crate) fn train_network(
     for point in &points {
         monitor.evaluated(point);
     }
-    let mut is_due = false;
+    let (mut is_due, mut saved_at) = (false, 0);
     let mut observer = |progress: &Progress<'_>| {
         monitor.trained(progress);
         if let Some(evaluation) = &progress.evaluation {
@@ -53,14 +57,16 @@ pub(crate) fn train_network(
             points.push(point);
         }
         let should_stop = monitor.should_stop();
+        is_due |= progress.env_steps >= saved_at + SAVE_EVERY;
         if let Some(file) = monitor.training_file().filter(|_| is_due || should_stop)
             // A run may end with an evaluation, so none continues from one.
             && progress.evaluation.is_none()
             && let Some(checkpoint) = progress.checkpoint()
         {
             file.save(&checkpoint, &points);
+            (is_due, saved_at) = (false, progress.env_steps);
         }
-        is_due = progress.evaluation.is_some();
+        is_due |= progress.evaluation.is_some();
         if should_stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let trained = match training.learner.resume(&checkpoint, &mut environments, &mut observer) {
