@@ -1,7 +1,7 @@
 //! Learning curves: one thin line an option, and their mean, in which an option that has stopped keeps its last return.
 
 use sharp_draw::numbers::plain;
-use sharp_draw::{Axis, Panel};
+use sharp_draw::{Axis, Marker, Panel};
 
 use super::super::figure::{Figure, Style, Table, method_legend};
 use super::{PaperLeg, PaperLine};
@@ -50,7 +50,10 @@ fn panel(lines: &[&PaperLine]) -> Panel {
     let place = |(at, value): (u64, f64)| [steps.at(at as f64), returns.at(value)];
     for leg in &legs {
         let points: Vec<(u64, f64)> = leg.curve.iter().map(|&(at, value, ..)| (at, value)).collect();
-        chart.polyline(points.into_iter().map(place), color, 0.4);
+        let points: Vec<[f64; 2]> = points.into_iter().map(place).collect();
+        // Where it stopped: many are evaluated once.
+        points.last().iter().for_each(|end| chart.marker(**end, Marker::Circle, 1.5, color));
+        chart.polyline(points, color, 0.4);
     }
     chart.polyline(means(&legs).into_iter().map(place), color, 2.4);
     panel

@@ -23,7 +23,7 @@ pub(super) fn text(lines: &[&PaperLine]) -> String {
         let (cpu, cores) = (&line.machine.cpu, line.machine.cores);
         _ = writeln!(
             text,
-            "Machine: {cpu}, {cores} cores, nothing else running unless said. Seed 1, one trial."
+            "Machine: {cpu}, {cores} cores, shared with other work at times. Seed 1, one trial."
         );
     }
     let of = |method: &str| -> Vec<&PaperLine> {
