@@ -2,18 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 
 use sharp_drive::{GuideProgress, GuideView, Observation, OptionPolicy, Policy, Situation};
-use sharp_guide::{GuidePath, LegId};
+use sharp_guide::{GuidePath, GuidedOption, LegId};
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_plan::{
-    AbstractionFile, Conditions, Method, OptionLibrary, Outcome, PaperProtocol, Plan, PlanningProblem, Query,
-    Selection, Solution, StoredOption, map_hash, solve,
+    AbstractionFile, Conditions, LibraryKey, Method, Monitor, OptionLibrary, Outcome, PaperProtocol, Plan,
+    PlanningProblem, Query, Selection, Solution, StoredOption, map_hash, solve,
 };
-use sharp_rl::{StopRule, TrainSettings};
-use sharp_sim::{NoiseModel, RobotModel, RobotState};
+use sharp_rl::{Progress, StopRule, TrainSettings};
+use sharp_sim::{NoiseModel, RobotModel, RobotState, SimulatorKind};
 use sharp_space::{Pose, Seed, Vector};
 use tempfile::TempDir;
 
@@ -52,20 +54,36 @@ fn quick_fast() -> Method {
 }
 
 fn solved(world: &TestWorld, method: &Method, seed: Seed, library: &mut OptionLibrary) -> Solution {
-    let conditions = Conditions::new(&world.world, NoiseModel::nominal());
-    let (world, abstraction) = (&world.world, &world.abstraction);
-    let problem =
-        PlanningProblem { world, method, conditions: &conditions, query: across(), seed, monitor: &() };
-    match solve(&problem, abstraction, library) {
-        Ok(Outcome::Solved(solution)) => *solution,
+    match outcome(world, (method, seed), library, &()) {
+        Outcome::Solved(solution) => *solution,
         other => panic!("no solution but {other:?}"),
     }
 }
 
+fn outcome(
+    world: &TestWorld,
+    (method, seed): (&Method, Seed),
+    library: &mut OptionLibrary,
+    monitor: &dyn Monitor,
+) -> Outcome {
+    let conditions = Conditions::new(&world.world, NoiseModel::nominal());
+    let (world, abstraction) = (&world.world, &world.abstraction);
+    let problem = PlanningProblem { world, method, conditions: &conditions, query: across(), seed, monitor };
+    solve(&problem, abstraction, library).expect("folders that can be written")
+}
+
 /// Solves from nothing with `threads` threads and writes the plan to a folder.
 fn plan_folder(world: &TestWorld, method: &Method, seed: Seed, threads: usize) -> TempDir {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    let solution = pool.install(|| solved(world, method, seed, &mut OptionLibrary::in_memory()));
+    let solution = with_threads(threads, || solved(world, method, seed, &mut OptionLibrary::in_memory()));
+    written(world, method, seed, solution)
+}
+
+fn with_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool").install(work)
+}
+
+/// Writes the plan of `solution` to a folder.
+fn written(world: &TestWorld, method: &Method, seed: Seed, solution: Solution) -> TempDir {
     let kind = world.abstraction.options.kind();
     let map = map_hash(&world.world.grid);
     let (states, settings) = (&*world.abstraction.states, OptionSettings::default());
@@ -118,6 +136,60 @@ fn weights_have_the_same_bytes_whatever_the_threads() {
     let weights = files.keys().filter(|file| file.ends_with(".safetensors")).count();
     // Each option has a network of its own: π_0, two options, π_{n+1}.
     assert_eq!(weights, 4, "{:?}", files.keys());
+}
+
+/// What ends a solve after so many steps of training, of all its options together.
+struct EndAfter {
+    steps: AtomicI64,
+    /// Ends it as a kill does, without a word to the solver.
+    kills: bool,
+}
+
+impl Monitor for EndAfter {
+    fn trained(&self, _: &GuidedOption, _: &Progress<'_>) {
+        let left = self.steps.fetch_sub(1, Ordering::Relaxed);
+        assert!(!(self.kills && left <= 0), "killed, as the test wants it");
+    }
+
+    fn should_stop(&self) -> bool {
+        !self.kills && self.steps.load(Ordering::Relaxed) <= 0
+    }
+}
+
+#[test]
+fn a_solve_that_is_ended_within_trainings_goes_on_and_comes_to_the_same_bytes() {
+    let world = TestWorld::drawn(ROOMS, RobotModel::husky(), OptionKind::Centroid);
+    let (method, seed, noise) = (tiny_paper(), Seed(5), NoiseModel::nominal());
+    let whole = content(plan_folder(&world, &method, seed, 2).path());
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let root = folder.path().join("training");
+    let key = LibraryKey {
+        world: &world.world,
+        noise: &noise,
+        simulator: SimulatorKind::Kinematic,
+        method: &method,
+        states: "",
+    };
+    let library = || OptionLibrary::in_memory().with_trainings(&root, &key);
+    // Four options take 600 steps each and are evaluated every 300.
+    for (steps, kills, threads) in [(150, false, 1), (700, true, 2), (900, false, 2)] {
+        let monitor = EndAfter { steps: AtomicI64::new(steps), kills };
+        let ended = std::panic::catch_unwind(AssertUnwindSafe(|| {
+            with_threads(threads, || outcome(&world, (&method, seed), &mut library(), &monitor))
+        }));
+        let is_as_wanted = if kills { ended.is_err() } else { matches!(ended, Ok(Outcome::Stopped)) };
+        assert!(is_as_wanted, "after {steps} steps");
+    }
+    let mut library = library();
+    let monitor = EndAfter { steps: AtomicI64::new(i64::MAX), kills: false };
+    let Outcome::Solved(solution) = outcome(&world, (&method, seed), &mut library, &monitor) else {
+        panic!("nothing stops it any more")
+    };
+    let repeated = i64::MAX - monitor.steps.into_inner();
+    assert!(repeated < 1200, "{repeated} steps of 2400 were left, most of them had been done");
+    assert!(content(written(&world, &method, seed, *solution).path()) == whole, "other bytes");
+    library.save().expect("a folder that can be written");
+    assert!(!root.exists(), "no training is left behind");
 }
 
 /// What `policy` wants at 50 places beside `guide`, to the bit.

@@ -13,6 +13,8 @@ mod eval;
 mod examples;
 mod fuzz;
 mod packages;
+mod paper_row;
+mod paper_table;
 mod peers;
 mod peers_learning;
 mod peers_option;
@@ -44,6 +46,10 @@ usage: cargo xtask COMMAND
   eval [--profile smoke|quick|paper] [ARGS]
                          sharp eval of that suite
   baselines [ARGS]       sharp eval of every baseline on every problem under every noise
+  paper-table [--minutes N] [--only TEXT] [--trial ROW]
+                         the paper's protocol from end to end: measures what is missing for N
+                         minutes (0), of the rows whose name holds TEXT, and writes results.md;
+                         --trial measures one row with a library of its own and keeps nothing
   bench [CRATE] [ARGS]   the benches of one crate or of all; ARGS go to criterion
   bench peers [sim|learning|option|regions]
                          the same work here and in other programs, as JSON lines
@@ -69,6 +75,7 @@ fn main() -> ExitCode {
         "train-regions" => train_regions::run(rest),
         "eval" => eval::run(rest),
         "baselines" => baselines::run(rest),
+        "paper-table" => paper_table::run(rest),
         "bench" if rest.first().is_some_and(|word| word == "peers") => peers::run(&rest[1..]),
         "bench" => bench::run(rest),
         "help" | "-h" | "--help" => {

@@ -70,7 +70,7 @@ impl NamedWorld {
     ) -> Result<(Sharp, AbstractionFile), BenchError> {
         let SolveSettings { abstraction, method, simulator, seed } = settings;
         let Self { world, noise_model, .. } = self;
-        let library = settings.library(world, noise_model, library)?;
+        let library = settings.library(world, noise_model, library.into())?;
         let (sharp, file) = prepare(world.clone(), abstraction, library.folder(), &())?;
         let sharp = sharp
             .with_method(method.clone())

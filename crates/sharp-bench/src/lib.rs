@@ -62,7 +62,10 @@ pub use contender::{ComparisonSettings, Composed, Contender, Driven, compare};
 pub use curves::CurveFolder;
 pub use dispatch::{DispatchLine, DispatchReply, Dispatcher, Odds};
 pub use error::BenchError;
-pub use evaluation::{ReportError, ReportInput, table, totals, write_report};
+pub use evaluation::{
+    PaperLeg, PaperLine, PaperRow, ReportError, ReportInput, paper_rows, table, totals, write_paper,
+    write_report,
+};
 pub use jobs::{
     Done, Ended, Engine, EngineMonitor, Experiment, Inputs, Job, JobWork, Lesson, LessonRound, LocalEngine,
     Manifest, Merged, SharpSettings, SlurmEngine, SlurmScripts, Submission, Suite, SuiteSelection, System,
@@ -78,8 +81,8 @@ pub use prior::{
     score_policies, train_prior,
 };
 pub use reports::{
-    BaselineReport, BaselineTimes, GoalReport, MapReport, OptionReport, Predicted, RunReport, SolveReport,
-    Verified,
+    BaselineReport, BaselineTimes, EvaluationReport, GoalReport, MapReport, OptionReport, Predicted,
+    RunReport, SolveReport, TrainingReport, UnsolvedTraining, Verified,
 };
 pub use result::{
     Machine, ResultError, ResultLine, Variant, default_regions, problem_folder, read_baselines, row_text,
@@ -87,7 +90,7 @@ pub use result::{
 pub use robot_import::{ImportError, ImportWishes, ImportedField, ImportedRobot, import_robot};
 pub use serve_line::{ServeLine, parse_pose_line, parse_serve_line};
 pub use show::PlanPage;
-pub use solve::{AbstractionRequest, SolveSettings, Solved, prepare, solve};
+pub use solve::{AbstractionRequest, SolveFolders, SolveSettings, Solved, prepare, solve};
 pub use speed_mask::{SpeedMaskError, SpeedRule, speed_limits};
 pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
 pub use tensorboard::EventFile;

@@ -195,7 +195,8 @@ impl Measurement<'_> {
             self.monitor.trained(progress);
             if self.should_stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let conditions = Conditions::new(world, noise_model.clone());
+        let simulator = self.comparison.simulator.clone();
+        let conditions = Conditions { simulator, noise: noise_model.clone() };
         let learnt = FlatSac::learn(world, *query, (&conditions, self.seed), budget, &mut observer)
             .map_err(|error| BenchError::Learning(error.to_string()))?;
         // The limit is for learning: what was learnt is driven in any case.

@@ -1,10 +1,11 @@
 //! What solving, running and measuring report, as objects that serialise to JSON. Keys are a contract: once printed, a
 //! key keeps its meaning.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sharp_drive::{EpisodeEnd, EpisodeRecord, SuccessCount};
 use sharp_guide::Role;
-use sharp_plan::{Execution, Plan, PlannedOption, Solution};
+use sharp_plan::{Execution, Plan, PlannedOption, Solution, Training, TrainingPoint};
+use sharp_rl::StopReason;
 use sharp_space::OccupancyGrid;
 
 use crate::times::{DecisionTimes, Reuse, SolveTimes};
@@ -56,6 +57,66 @@ impl From<SuccessCount> for Verified {
     }
 }
 
+/// How a policy was trained.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrainingReport {
+    /// Why training ended: `rule` if an evaluation met its stop rule, `steps` if its budget was used up.
+    pub stop: StopReason,
+    /// Mean return of the policy that was kept, when it was evaluated.
+    pub mean_return: f64,
+    /// The evaluations on the way.
+    pub evaluations: Vec<EvaluationReport>,
+}
+
+/// One evaluation in the course of a training.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EvaluationReport {
+    /// Environment steps of training before it.
+    pub env_steps: u64,
+    /// Mean return of its episodes.
+    pub mean_return: f64,
+    /// Share of its episodes that succeeded, by the training's own rule for contacts.
+    pub success: f64,
+    /// Share of as many others that succeeded where a contact is a failure.
+    pub without_contact: f64,
+}
+
+/// How far the training of an option was when time was up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct UnsolvedTraining {
+    /// The option.
+    pub option: String,
+    /// Length of its guide, metres.
+    pub length_m: f64,
+    /// Environment steps so far.
+    pub env_steps: u64,
+    /// Why its training ended; `null` if it was under way.
+    pub stop: Option<StopReason>,
+    /// The evaluations so far.
+    pub evaluations: Vec<EvaluationReport>,
+}
+
+impl From<&Training> for TrainingReport {
+    fn from(training: &Training) -> Self {
+        Self {
+            stop: training.stop,
+            mean_return: training.mean_return,
+            evaluations: training.points.iter().map(EvaluationReport::from).collect(),
+        }
+    }
+}
+
+impl From<&TrainingPoint> for EvaluationReport {
+    fn from(point: &TrainingPoint) -> Self {
+        Self {
+            env_steps: point.env_steps,
+            mean_return: point.mean_return,
+            success: point.success.rate(),
+            without_contact: point.without_contact.rate(),
+        }
+    }
+}
+
 /// One use of an option in a plan.
 #[derive(Clone, Debug, Serialize)]
 pub struct OptionReport {
@@ -75,6 +136,9 @@ pub struct OptionReport {
     pub env_steps: u64,
     /// Gradient steps that its policy was learnt with.
     pub gradient_steps: u64,
+    /// How its policy was trained, where it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub training: Option<TrainingReport>,
     /// On its own initiation set.
     pub verified: Verified,
     /// On the states in which the option before arrives.
@@ -107,6 +171,7 @@ impl OptionReport {
             policy: learnt.policy.kind(),
             env_steps: learnt.env_steps,
             gradient_steps: learnt.gradient_steps,
+            training: learnt.training.as_ref().map(TrainingReport::from),
             verified: learnt.estimate.count.into(),
             on_arrival: (*on_arrival).into(),
             length_m: option.guide.length_m(),
@@ -204,6 +269,9 @@ pub struct SolveReport {
     pub goals: Vec<GoalReport>,
     /// The options of the plan in order.
     pub plan: Vec<OptionReport>,
+    /// The trainings until time was up, where it was up before there was a plan.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trainings: Vec<UnsolvedTraining>,
     /// How many of them had been learnt before.
     pub reuse: Reuse,
     /// What the plan says of itself.

@@ -22,6 +22,8 @@ use crate::stopwatch::TimedMonitor;
 use crate::times::{Reuse, SolveTimes};
 use sharp_drive::World;
 
+/// The status of a solve that was stopped without a plan.
+const TIMEOUT: &str = "timeout";
 /// A plan that succeeds less often is run with recovery as well.
 const SHAKY: f64 = 0.98;
 /// In so many episodes.
@@ -51,6 +53,21 @@ pub struct SolveSettings {
     pub seed: u64,
 }
 
+/// Where a solve keeps what lasts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SolveFolders<'a> {
+    /// The library; without it the solve begins with nothing and keeps nothing.
+    pub library: Option<&'a Path>,
+    /// Where trainings are kept while they run ([`Method::keeps_trainings`]); `None` for the library's own folder.
+    pub trainings: Option<&'a Path>,
+}
+
+impl<'a> From<Option<&'a Path>> for SolveFolders<'a> {
+    fn from(library: Option<&'a Path>) -> Self {
+        Self { library, trainings: None }
+    }
+}
+
 /// What solving gave.
 #[derive(Debug)]
 pub struct Solved {
@@ -63,23 +80,23 @@ pub struct Solved {
     file: AbstractionFile,
 }
 
-/// Algorithm 1 on `problem`, with what the library in the folder `library` holds; without a folder with nothing.
+/// Algorithm 1 on `problem`, with what the library holds.
 ///
-/// Nothing is written but what the method [saves at once](Method::saves_at_once), and the abstraction into the
-/// library: [`Solved::write`] and [`Solved::save_library`] do the rest.
+/// Nothing is written but trainings that take hours ([`Method::keeps_trainings`]) and, into the library, the abstraction:
+/// [`Solved::write`] and [`Solved::save_library`] do the rest.
 ///
 /// # Errors
 /// If the robot does not fit at an end of the problem or nowhere in the map, or a file is broken.
 pub fn solve(
     problem: &NamedProblem,
     settings: &SolveSettings,
-    library: Option<&Path>,
+    folders: SolveFolders<'_>,
     monitor: &TimedMonitor<'_>,
 ) -> Result<Solved, BenchError> {
     let NamedProblem { world, query, noise_model, .. } = problem;
     let SolveSettings { abstraction, method, simulator, seed } = settings;
     query.check(world)?;
-    let library = settings.library(world, noise_model, library)?;
+    let library = settings.library(world, noise_model, folders)?;
     monitor.phase(Phase::Done);
     let (sharp, file) = prepare(world.clone(), abstraction, library.folder(), monitor)?;
     let mut sharp = sharp
@@ -94,6 +111,9 @@ pub fn solve(
     if let (Some(predicted), Some(plan)) = (&mut report.predicted, &plan) {
         monitor.phase(Phase::Verify);
         predicted.with_recovery = with_recovery(&Arc::new(plan.clone()).into(), settings);
+    }
+    if report.status == TIMEOUT {
+        report.trainings = monitor.trainings();
     }
     monitor.phase(Phase::Done);
     let report = SolveReport { time_s: monitor.times(), ..report };
@@ -169,8 +189,7 @@ impl AbstractionRequest {
 }
 
 impl SolveSettings {
-    /// The library in the folder `root` for what is learnt in `world` under `noise`; without a folder one that is kept
-    /// nowhere.
+    /// The library in `folders` for what is learnt in `world` under `noise`; without a folder one that is kept nowhere.
     ///
     /// # Errors
     /// Names the file that is damaged or of another format.
@@ -178,13 +197,17 @@ impl SolveSettings {
         &self,
         world: &World,
         noise: &NoiseModel,
-        root: Option<&Path>,
+        folders: SolveFolders<'_>,
     ) -> Result<OptionLibrary, BenchError> {
-        let Some(root) = root else { return Ok(OptionLibrary::in_memory()) };
         let states = self.abstraction.states_name();
         let Self { method, simulator, .. } = self;
         let key = LibraryKey { world, noise, simulator: *simulator, method, states: &states };
-        Ok(OptionLibrary::open_for(root, &key)?)
+        let opened = |root| OptionLibrary::open_for(root, &key);
+        let library = folders.library.map_or_else(|| Ok(OptionLibrary::in_memory()), opened)?;
+        Ok(match folders.trainings {
+            Some(root) => library.with_trainings(root, &key),
+            None => library,
+        })
     }
 }
 
@@ -195,7 +218,7 @@ pub(crate) fn answered(report: SolveReport, answer: Answer) -> (SolveReport, Opt
         Answer::NoPlan(reason) => (SolveReport { reason: Some(reason), ..report }, None),
         Answer::Stopped => {
             let reason = "stopped before a plan was verified; what was learnt is kept".to_owned();
-            (SolveReport { status: "timeout", reason: Some(reason), ..report }, None)
+            (SolveReport { status: TIMEOUT, reason: Some(reason), ..report }, None)
         }
     }
 }
@@ -226,6 +249,7 @@ pub(crate) fn blank_report(
         options_available,
         goals: vec![],
         plan: vec![],
+        trainings: vec![],
         reuse: Reuse { uses: 0, reused: 0 },
         predicted: None,
         time_s: SolveTimes::default(),

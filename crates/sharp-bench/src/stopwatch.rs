@@ -6,10 +6,11 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use sharp_guide::GuidedOption;
-use sharp_plan::{LearntPolicy, Monitor, Phase};
+use sharp_guide::{GuidedOption, LegId};
+use sharp_plan::{LearntPolicy, Monitor, Phase, TrainingPoint};
 use sharp_rl::Progress;
 
+use crate::reports::UnsolvedTraining;
 use crate::times::SolveTimes;
 
 /// Wall time by phase, seconds.
@@ -91,6 +92,7 @@ pub fn clock_us() -> impl Fn() -> f64 + Sync {
 pub struct TimedMonitor<'a> {
     stopwatch: Mutex<Stopwatch>,
     deadline: Option<Instant>,
+    trainings: Mutex<BTreeMap<LegId, UnsolvedTraining>>,
     inner: &'a dyn Monitor,
 }
 
@@ -105,13 +107,30 @@ impl<'a> TimedMonitor<'a> {
     #[must_use]
     pub fn new(stopwatch: Stopwatch, limit: Option<Duration>, inner: &'a dyn Monitor) -> Self {
         let deadline = stopwatch.deadline(limit);
-        Self { stopwatch: Mutex::new(stopwatch), deadline, inner }
+        Self { stopwatch: Mutex::new(stopwatch), deadline, trainings: Mutex::default(), inner }
     }
 
     /// The times so far.
     #[must_use]
     pub fn times(&self) -> SolveTimes {
         SolveTimes::from(&*self.watch())
+    }
+
+    /// How far the trainings are.
+    #[must_use]
+    pub(crate) fn trainings(&self) -> Vec<UnsolvedTraining> {
+        self.trainings.lock().unwrap_or_else(PoisonError::into_inner).values().cloned().collect()
+    }
+
+    fn note(&self, option: &GuidedOption, change: impl FnOnce(&mut UnsolvedTraining)) {
+        let mut trainings = self.trainings.lock().unwrap_or_else(PoisonError::into_inner);
+        change(trainings.entry(option.id).or_insert_with(|| UnsolvedTraining {
+            option: option.id.to_string(),
+            length_m: option.guide.length_m(),
+            env_steps: 0,
+            stop: None,
+            evaluations: vec![],
+        }));
     }
 
     fn watch(&self) -> MutexGuard<'_, Stopwatch> {
@@ -138,10 +157,18 @@ impl Monitor for TimedMonitor<'_> {
     }
 
     fn trained(&self, option: &GuidedOption, progress: &Progress<'_>) {
+        self.note(option, |training| training.env_steps = progress.env_steps);
         self.inner.trained(option, progress);
     }
 
+    fn evaluated(&self, option: &GuidedOption, point: &TrainingPoint) {
+        self.note(option, |training| training.evaluations.push(point.into()));
+        self.inner.evaluated(option, point);
+    }
+
     fn learnt(&self, option: &GuidedOption, learnt: &LearntPolicy) {
+        let stop = learnt.training.as_ref().map(|training| training.stop);
+        self.note(option, |training| (training.env_steps, training.stop) = (learnt.env_steps, stop));
         self.inner.learnt(option, learnt);
     }
 

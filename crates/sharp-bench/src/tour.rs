@@ -11,7 +11,7 @@ use crate::json::to_json;
 use crate::named::NamedProblem;
 use crate::pictures;
 use crate::reports::{GoalReport, Predicted, SolveReport};
-use crate::solve::{SolveSettings, Solved, solve, with_recovery};
+use crate::solve::{SolveFolders, SolveSettings, Solved, solve, with_recovery};
 use crate::stopwatch::TimedMonitor;
 use crate::times::Reuse;
 
@@ -34,7 +34,7 @@ pub fn solve_tour(
     problem: &NamedProblem,
     goals: &[Pose],
     settings: &SolveSettings,
-    library: Option<&Path>,
+    folders: SolveFolders<'_>,
     monitor: &TimedMonitor<'_>,
 ) -> Result<SolvedTour, BenchError> {
     for (index, &goal) in goals.iter().enumerate() {
@@ -45,7 +45,7 @@ pub fn solve_tour(
     let (mut solved, mut start): (Vec<Solved>, Pose) = (Vec::new(), problem.query.start);
     for &goal in goals {
         let leg = NamedProblem { query: Query { start, goal }, ..problem.clone() };
-        let mut one = solve(&leg, settings, library, monitor)?;
+        let mut one = solve(&leg, settings, folders, monitor)?;
         one.save_library()?;
         let end = one.plan.as_ref().map(end_of);
         solved.push(one);

@@ -217,9 +217,10 @@ pub(crate) struct Solve {
     /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
-    /// The simulator in which policies are learnt and the plan is verified; the others are described at `run`.
-    #[arg(long, default_value = "kinematic", value_name = "kinematic|rapier2d|rapier3d")]
-    pub(crate) simulator: String,
+    /// The simulator in which policies are learnt and the plan is verified; they are described at `run`
+    /// [default: kinematic; with --learning paper rapier2d].
+    #[arg(long, value_name = "kinematic|rapier2d|rapier3d")]
+    pub(crate) simulator: Option<String>,
     /// Whether measured costs of options flow back into the search, or A* keeps its first ones.
     #[arg(long, value_enum, default_value_t = Switch::On)]
     pub(crate) cost_update: Switch,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use sharp_bench::SpeedRule;
 use sharp_drive::SpeedLimits;
 use sharp_maps::{LoadOptions, MapFile, load, load_scenario, load_values};
-use sharp_plan::Query;
+use sharp_plan::{Method, Query};
 use sharp_sim::{SimulatorKind, UnknownSimulator};
 use sharp_space::{Point, Pose, trig};
 
@@ -78,6 +78,11 @@ pub(crate) fn speed_limits(
 /// The simulator called `name`.
 pub(crate) fn simulator(name: &str) -> Result<SimulatorKind, Failure> {
     name.parse().map_err(|error: UnknownSimulator| Failure::new("USAGE", format!("--simulator: {error}")))
+}
+
+/// The simulator called `name`; without a name the one of `method`.
+pub(crate) fn training_simulator(name: Option<&str>, method: &Method) -> Result<SimulatorKind, Failure> {
+    name.map_or(Ok(method.simulator), simulator)
 }
 
 /// Whether a pose needs a heading.

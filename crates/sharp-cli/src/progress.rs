@@ -1,15 +1,16 @@
 //! Progress on a terminal, and interruption.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use sharp_bench::CurveFolder;
-use sharp_guide::GuidedOption;
-use sharp_plan::{LearntPolicy, Monitor, Phase};
-use sharp_rl::Progress;
+use sharp_guide::{GuidedOption, LegId};
+use sharp_plan::{LearntPolicy, Monitor, Phase, TrainingPoint};
+use sharp_rl::{Progress, StopRule};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -30,7 +31,12 @@ pub(crate) fn is_interrupted() -> bool {
 
 /// A spinner on a terminal, nothing elsewhere.
 pub(crate) fn spinner(message: &str) -> ProgressBar {
-    let bar = ProgressBar::new_spinner().with_message(message.to_owned());
+    ticking(ProgressBar::new_spinner(), message)
+}
+
+/// A spinner that ticks, once it has its place on the terminal.
+fn ticking(bar: ProgressBar, message: &str) -> ProgressBar {
+    bar.set_message(message.to_owned());
     bar.enable_steady_tick(Duration::from_millis(100));
     bar
 }
@@ -43,22 +49,31 @@ pub(crate) fn bar(len: u64, message: &str) -> ProgressBar {
     ProgressBar::new(len).with_style(style).with_message(message.to_owned())
 }
 
+/// Steps of a training between two looks of the terminal at it.
+const LINE_EVERY: u64 = 50;
+
 /// Shows on a terminal what the solver does, draws learning curves, and stops when the user does.
 pub(crate) struct SolveMonitor {
+    lines: MultiProgress,
     spinner: ProgressBar,
+    trainings: Mutex<BTreeMap<LegId, TrainingLine>>,
     learnt: AtomicUsize,
     curves: Option<Mutex<CurveFolder>>,
 }
 
 impl SolveMonitor {
-    /// Shows on `spinner` what the solver does; `curves` is the folder of learning curves, if they are wanted.
-    pub(crate) fn new(spinner: ProgressBar, curves: Option<&Path>) -> Self {
+    /// Begins with `message`; `curves` is the folder of learning curves, if they are wanted.
+    pub(crate) fn new(message: &str, curves: Option<&Path>) -> Self {
+        let lines = MultiProgress::new();
+        let spinner = ticking(lines.add(ProgressBar::new_spinner()), message);
         let curves = curves.map(|folder| Mutex::new(CurveFolder::new(folder)));
-        Self { spinner, learnt: AtomicUsize::new(0), curves }
+        Self { lines, spinner, trainings: Mutex::default(), learnt: AtomicUsize::new(0), curves }
     }
 
     /// Clears the terminal once the solver is done.
     pub(crate) fn finish(self) {
+        // A training that was stopped has a line still.
+        _ = self.lines.clear();
         self.spinner.finish_and_clear();
         warn_of_curves(self.curves);
     }
@@ -70,6 +85,56 @@ pub(crate) fn warn_of_curves(curves: Option<Mutex<CurveFolder>>) {
     if let Some(error) = curves.as_ref().and_then(CurveFolder::failure) {
         eprintln!("warning: learning curves are incomplete: {error}");
     }
+}
+
+/// The line of one training.
+struct TrainingLine {
+    bar: ProgressBar,
+    /// When it was looked at first, and the steps behind it then.
+    begun: Option<(Instant, u64)>,
+    evaluation: Option<TrainingPoint>,
+}
+
+impl TrainingLine {
+    fn new(lines: &MultiProgress) -> Self {
+        let bar = ticking(lines.add(ProgressBar::new_spinner()), "");
+        Self { bar, begun: None, evaluation: None }
+    }
+
+    fn show(&mut self, id: LegId, progress: &Progress<'_>) {
+        let (begun, first) = *self.begun.get_or_insert((Instant::now(), progress.env_steps));
+        let steps = progress.env_steps.saturating_sub(first);
+        let rate = steps as f64 / begun.elapsed().as_secs_f64().max(0.1);
+        self.bar.set_message(training_text(id, progress, self.evaluation.as_ref(), rate));
+    }
+}
+
+/// How far the training of `id` is, how good it was when it was evaluated, and how long it may take yet at `rate` steps a
+/// second.
+fn training_text(
+    id: LegId,
+    progress: &Progress<'_>,
+    evaluation: Option<&TrainingPoint>,
+    rate: f64,
+) -> String {
+    let steps = progress.env_steps;
+    let mut text = format!("{id}: {steps} steps");
+    if let Some(most) = progress.max_env_steps {
+        text += &format!(" of at most {most}");
+    }
+    if let Some(point) = evaluation {
+        text += &format!(", mean return {:.0}", point.mean_return);
+        if let Some(StopRule::MeanReturn(wanted)) = progress.stop {
+            text += &format!(" (stops at {wanted:.0})");
+        }
+        let [success, without] = [point.success, point.without_contact].map(|count| 100.0 * count.rate());
+        text += &format!(", arrives {success:.0} %, without contact {without:.0} %");
+    }
+    if let Some(most) = progress.max_env_steps.filter(|_| rate > 0.0) {
+        let left_s = most.saturating_sub(steps) as f64 / rate;
+        text += &format!(", at most {:.0} min left", (left_s / 60.0).ceil());
+    }
+    text
 }
 
 impl Monitor for SolveMonitor {
@@ -87,13 +152,30 @@ impl Monitor for SolveMonitor {
     }
 
     fn trained(&self, option: &GuidedOption, progress: &Progress<'_>) {
+        if progress.env_steps.is_multiple_of(LINE_EVERY) {
+            let mut trainings = self.trainings.lock().unwrap_or_else(PoisonError::into_inner);
+            trainings
+                .entry(option.id)
+                .or_insert_with(|| TrainingLine::new(&self.lines))
+                .show(option.id, progress);
+        }
         if let Some(curves) = &self.curves {
             let name = option.id.to_string().replace(':', "_");
             curves.lock().unwrap_or_else(PoisonError::into_inner).note(&name, progress);
         }
     }
 
+    fn evaluated(&self, option: &GuidedOption, point: &TrainingPoint) {
+        let mut trainings = self.trainings.lock().unwrap_or_else(PoisonError::into_inner);
+        let line = trainings.entry(option.id).or_insert_with(|| TrainingLine::new(&self.lines));
+        line.evaluation = Some(*point);
+    }
+
     fn learnt(&self, option: &GuidedOption, learnt: &LearntPolicy) {
+        let mut trainings = self.trainings.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(line) = trainings.remove(&option.id) {
+            line.bar.finish_and_clear();
+        }
         let learnt_so_far = self.learnt.fetch_add(1, Ordering::Relaxed) + 1;
         let count = learnt.estimate.count;
         self.spinner.set_message(format!(

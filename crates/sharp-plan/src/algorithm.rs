@@ -81,6 +81,7 @@ pub(crate) fn solve_with(
         }
         (outcome, _) => outcome,
     };
+    library.end_problem(matches!(outcome, Ok(Outcome::Solved(_) | Outcome::NoPlan(_))));
     problem.monitor.phase(Phase::Done);
     outcome
 }

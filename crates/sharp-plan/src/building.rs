@@ -312,7 +312,10 @@ fn obtain(
     match method.learner.learn(&task, &|| monitor.should_stop()) {
         Ok(learnt) => Obtained::Learnt(learnt),
         Err(LearnFailure::Stopped) => Obtained::Stopped,
-        Err(LearnFailure::Broken(_)) => Obtained::Learnt(LearntPolicy::useless(&world.robot)),
+        // Buildings keep no trainings.
+        Err(LearnFailure::Broken(_) | LearnFailure::File(_)) => {
+            Obtained::Learnt(LearntPolicy::useless(&world.robot))
+        }
     }
 }
 

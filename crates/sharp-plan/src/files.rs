@@ -76,6 +76,22 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     Ok(())
 }
 
+/// Writes `bytes` under a line with their checksum.
+pub(crate) fn write_under_checksum(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    write_atomic(path, &[format!("{PREFIX}{}\n", hash(bytes)).as_bytes(), bytes].concat())
+}
+
+/// Reads what [`write_under_checksum`] wrote.
+pub(crate) fn read_under_checksum(path: &Path) -> Result<Vec<u8>, FileError> {
+    let whole = fs::read(path).map_err(io(path))?;
+    let end = whole.iter().position(|&byte| byte == b'\n').unwrap_or(whole.len());
+    let bytes = whole.get(end + 1..).unwrap_or(&[]);
+    if whole[..end] == *format!("{PREFIX}{}", hash(bytes)).as_bytes() {
+        return Ok(bytes.to_vec());
+    }
+    Err(FileError::Checksum { path: path.to_owned() })
+}
+
 /// Writes `value` as RON with a checksum.
 ///
 /// # Errors

@@ -74,8 +74,8 @@ pub use files::{FileError, hash, read_ron, write_atomic, write_ron};
 pub use hand_over::HandOver;
 pub use known::KnownOptions;
 pub use learn::{
-    LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner, PaperProtocol, PriorOnly,
-    Selection,
+    InterruptedTraining, LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner,
+    PaperProtocol, PriorOnly, Selection, Training, TrainingFile, TrainingPoint,
 };
 pub use library::{FORMAT, LibraryKey, OptionLibrary, StoredOption};
 pub use method::{LearningOrder, Method, PriceRule, RepairSettings, SearchSettings};

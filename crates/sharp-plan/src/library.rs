@@ -17,7 +17,7 @@ use sharp_drive::{
     Follower, NetworkPolicy, OptionPolicy, PolicyInterface, ProfiledFollower, SuccessCount, SuccessEstimate,
     World,
 };
-use sharp_guide::GuidePath;
+use sharp_guide::{GuidePath, LegId};
 use sharp_options::OptionId;
 use sharp_rl::Actor;
 use sharp_sim::{NoiseModel, SimulatorKind};
@@ -25,7 +25,7 @@ use sharp_sim::{NoiseModel, SimulatorKind};
 use crate::building::{BUILDING_FORMAT, Building};
 use crate::files::{self, FileError};
 use crate::hand_over::HandOver;
-use crate::learn::LearntPolicy;
+use crate::learn::{LearntPolicy, Training};
 use crate::method::Method;
 use crate::plan_file::map_hash;
 
@@ -33,6 +33,8 @@ use crate::plan_file::map_hash;
 pub const FORMAT: u32 = 6;
 /// How the names of files of whole buildings begin.
 const BUILDING: &str = "building-";
+/// The folder, beside the options, of trainings that are under way.
+const TRAININGS: &str = "training";
 /// How the names of intents begin: options that are about to be written, all of them or none.
 const INTENT: &str = "saving-";
 
@@ -129,6 +131,8 @@ struct OptionFile {
     mean_time_s: f64,
     env_steps: u64,
     gradient_steps: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    training: Option<Training>,
 }
 
 /// Options that were to be written at once.
@@ -155,6 +159,30 @@ pub struct LibraryKey<'a> {
     pub states: &'a str,
 }
 
+impl LibraryKey<'_> {
+    /// The name of the folder for it: of the world, a hyphen, of the map.
+    fn folder_name(&self) -> String {
+        let LibraryKey { world, noise, simulator, method, states } = *self;
+        let mut conditions = format!("{:?} {noise:?} {} {FORMAT}", world.robot, method.name);
+        // The usual simulator is not named, so that libraries from before there was a choice stay valid.
+        if simulator != SimulatorKind::Kinematic {
+            conditions += &format!(" {simulator:?}");
+        }
+        if let Some(limits) = &world.speed_limits {
+            let text = ron::to_string(&**limits).expect("limits are plain numbers");
+            conditions += &format!(" {}", files::hash(text.as_bytes()));
+        }
+        if let Some(prior) = &world.own_prior {
+            conditions += &format!(" {}", files::hash(&prior.to_bytes()));
+        }
+        if !states.is_empty() {
+            conditions += &format!(" {states}");
+        }
+        let conditions = &files::hash(conditions.as_bytes())[..8];
+        format!("{}-{conditions}-{}", world.robot.name, &map_hash(&world.grid)[..16])
+    }
+}
+
 /// Learnt options by name, in memory and, where a folder is given, on disk.
 #[derive(Debug, Default)]
 pub struct OptionLibrary {
@@ -173,6 +201,12 @@ pub struct OptionLibrary {
     version: u64,
     /// Options that are to be written by [`OptionLibrary::save`]; `None` where they are written at once.
     unsaved: Option<BTreeSet<OptionId>>,
+    /// Where trainings are kept while they run.
+    trainings: Option<PathBuf>,
+    /// Those that were finished in this problem.
+    trained: Vec<(LegId, PathBuf)>,
+    /// Those that nothing needs once all is saved.
+    obsolete: Vec<PathBuf>,
 }
 
 impl OptionLibrary {
@@ -217,34 +251,47 @@ impl OptionLibrary {
     /// # Errors
     /// Returns an error that names the file that is damaged or of another format.
     pub fn open_for(root: &Path, key: &LibraryKey<'_>) -> Result<Self, FileError> {
-        let LibraryKey { world, noise, simulator, method, states } = *key;
-        let mut conditions = format!("{:?} {noise:?} {} {FORMAT}", world.robot, method.name);
-        // The usual simulator is not named, so that libraries from before there was a choice stay valid.
-        if simulator != SimulatorKind::Kinematic {
-            conditions += &format!(" {simulator:?}");
+        let name = key.folder_name();
+        let mut library = Self::open(root, &name)?;
+        if key.method.keeps_trainings {
+            library.trainings = Some(root.join(name).join(TRAININGS));
         }
-        if let Some(limits) = &world.speed_limits {
-            let text = ron::to_string(&**limits).expect("limits are plain numbers");
-            conditions += &format!(" {}", files::hash(text.as_bytes()));
-        }
-        if let Some(prior) = &world.own_prior {
-            conditions += &format!(" {}", files::hash(&prior.to_bytes()));
-        }
-        if !states.is_empty() {
-            conditions += &format!(" {states}");
-        }
-        let conditions = &files::hash(conditions.as_bytes())[..8];
-        let map = &map_hash(&world.grid)[..16];
-        let mut library = Self::open(root, &format!("{}-{conditions}-{map}", world.robot.name))?;
-        if !method.saves_at_once {
-            library.defer();
-        }
+        library.defer();
         Ok(library)
+    }
+
+    /// The same, while its trainings are kept below `root` in a folder of the world that `key` names. Otherwise those of a
+    /// library that was [opened](Self::open_for) lie beside its options, and those of one in memory are not kept.
+    #[must_use]
+    pub fn with_trainings(self, root: &Path, key: &LibraryKey<'_>) -> Self {
+        let trainings = key.method.keeps_trainings.then(|| root.join(key.folder_name()));
+        Self { trainings, ..self }
+    }
+
+    /// Where trainings are kept while they run.
+    pub(crate) fn trainings(&self) -> Option<&Path> {
+        self.trainings.as_deref()
+    }
+
+    /// Notes the file of a training that was finished in this problem.
+    pub(crate) fn note_training(&mut self, id: LegId, file: &Path) {
+        self.trained.push((id, file.to_owned()));
+    }
+
+    /// The problem has ended. Once all is saved nothing needs the trainings of a problem that is solved. Of another one only
+    /// those that the files of this library do not hold: whoever tries again goes on with them.
+    pub(crate) fn end_problem(&mut self, is_solved: bool) {
+        for (id, file) in std::mem::take(&mut self.trained) {
+            let is_stored = matches!(id, LegId::Option(id) if self.options.contains_key(&id));
+            if is_solved || (is_stored && self.folder.is_some()) {
+                self.obsolete.push(file);
+            }
+        }
     }
 
     /// From now on what is inserted reaches the disk with [`save`](Self::save) only: whoever is killed
     /// before that begins anew from the same library, and so comes to the same plan.
-    pub(crate) fn defer(&mut self) {
+    fn defer(&mut self) {
         self.unsaved.get_or_insert_default();
     }
 
@@ -284,6 +331,13 @@ impl OptionLibrary {
         }
         self.unfinished.clear();
         self.unsaved.iter_mut().for_each(BTreeSet::clear);
+        for training in std::mem::take(&mut self.obsolete) {
+            files::remove(&training)?;
+        }
+        // Others may be at work there: only what is empty goes.
+        for folder in self.trainings.iter().flat_map(|folder| folder.ancestors().take(2)) {
+            _ = std::fs::remove_dir(folder);
+        }
         Ok(())
     }
 
@@ -422,6 +476,7 @@ fn option_file(id: OptionId, option: &StoredOption, folder: &Path) -> Result<Opt
         mean_time_s: option.learnt.estimate.mean_time_s,
         env_steps: option.learnt.env_steps,
         gradient_steps: option.learnt.gradient_steps,
+        training: option.learnt.training.clone(),
     })
 }
 
@@ -504,6 +559,7 @@ fn load_option(file: OptionFile, folder: &Path, networks: &mut Networks) -> Resu
         estimate: SuccessEstimate { count: file.verified, mean_time_s: file.mean_time_s },
         env_steps: file.env_steps,
         gradient_steps: file.gradient_steps,
+        training: file.training,
     };
     Ok(StoredOption { guide: file.guide, learnt, corridor: file.corridor })
 }
@@ -581,7 +637,8 @@ mod tests {
     fn stored(policy: OptionPolicy) -> StoredOption {
         let count = SuccessCount { episodes: 1000, successes: 990 };
         let estimate = SuccessEstimate { count, mean_time_s: 4.5 };
-        let learnt = LearntPolicy { policy, estimate, env_steps: 600, gradient_steps: 300 };
+        let untrained = LearntPolicy::untrained(policy, estimate);
+        let learnt = LearntPolicy { env_steps: 600, gradient_steps: 300, ..untrained };
         StoredOption { guide: straight((0.0, 0.0), (2.0, 0.0)), learnt, corridor: "c".repeat(8) }
     }
 

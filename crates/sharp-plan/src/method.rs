@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use sharp_drive::FAILURE_COST_S;
 use sharp_guide::{GuidePlanner, GuideSettings, PlannerKind};
 use sharp_options::AllowedRule;
+use sharp_sim::SimulatorKind;
 
 use crate::learn::{OptionLearner, PaperProtocol, PriorOnly, Selection};
 
@@ -26,15 +27,17 @@ pub struct Method {
     pub name: String,
     /// How an option gets its policy.
     pub learner: Arc<dyn OptionLearner>,
+    /// Where policies are learnt and plans verified, unless another simulator is asked for.
+    pub simulator: SimulatorKind,
     /// How guides are planned.
     pub guides: Arc<dyn GuidePlanner>,
     /// What the search may assume and must respect.
     pub search: SearchSettings,
     /// In which order the options of a plan are learnt.
     pub order: LearningOrder,
-    /// Whether a library writes each option as soon as it is learnt. Otherwise it writes them all at the end, so that
-    /// a solve that was killed begins anew from the same library and comes to the same plan.
-    pub saves_at_once: bool,
+    /// Whether trainings are kept on disk while they run, because they take hours. A solve that was killed begins anew, from
+    /// the same library, and finds them.
+    pub keeps_trainings: bool,
     /// Fresh episodes that estimate a policy.
     pub estimate_episodes: u32,
     /// Success wanted of an option, share of episodes.
@@ -193,6 +196,9 @@ impl Method {
         Self {
             name: "paper".to_owned(),
             learner: Arc::new(PaperProtocol::default()),
+            // A robot that touches a wall slides along it, as in the paper. In the kinematic simulator it stands still, and a
+            // car that cannot reverse never moves again (docs/decisions/0022-the-paper-learns-with-contact.md).
+            simulator: SimulatorKind::Planar,
             search: SearchSettings {
                 price: PriceRule::Length,
                 untrained_surcharge_s: 0.0,
@@ -203,8 +209,7 @@ impl Method {
                 ..SearchSettings::default()
             },
             order: LearningOrder::Independent,
-            // Hours of training are kept. What is learnt does not depend on what else the library holds.
-            saves_at_once: true,
+            keeps_trainings: true,
             join_guides: false,
             usable_success: 0.0,
             ..Self::prior()
@@ -219,10 +224,11 @@ impl Method {
         Self {
             name: "prior".to_owned(),
             learner: Arc::new(PriorOnly),
+            simulator: SimulatorKind::Kinematic,
             guides: search.guide.to_planner(),
             search,
             order: LearningOrder::Chained,
-            saves_at_once: false,
+            keeps_trainings: false,
             estimate_episodes: 1000,
             option_success: 0.99,
             failure_cost_s: FAILURE_COST_S,

@@ -13,7 +13,7 @@ use sharp_space::{OccupancyGrid, Pose, Seed};
 
 use crate::abstraction::Abstraction;
 use crate::files::{self, FileError};
-use crate::learn::LearntPolicy;
+use crate::learn::{LearntPolicy, Training};
 use crate::library::{FORMAT, PolicyFile};
 use crate::method::{Method, SearchSettings};
 use crate::odds::ComposedOdds;
@@ -160,6 +160,8 @@ struct StepFile {
     arrival_time_s: f64,
     env_steps: u64,
     gradient_steps: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    training: Option<Training>,
     reused: bool,
 }
 
@@ -266,6 +268,7 @@ fn step_file(step: &PlannedOption, folder: &Path) -> Result<StepFile, FileError>
         arrival_time_s: *arrival_time_s,
         env_steps: learnt.env_steps,
         gradient_steps: learnt.gradient_steps,
+        training: learnt.training.clone(),
         reused: *reused,
     })
 }
@@ -294,6 +297,7 @@ fn planned_option(
         estimate: SuccessEstimate { count: file.verified, mean_time_s: file.mean_time_s },
         env_steps: file.env_steps,
         gradient_steps: file.gradient_steps,
+        training: file.training,
     };
     let option = GuidedOption::new(space, file.id, (file.from, file.to), file.guide, goal)
         .with_departure(file.departure);

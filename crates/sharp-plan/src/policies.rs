@@ -4,6 +4,7 @@ use sharp_drive::SuccessEstimate;
 use sharp_guide::{GuidedOption, LegId, Role};
 use sharp_space::OccupancyGrid;
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use crate::files::{self, FileError};
 use crate::learn::LearntPolicy;
@@ -60,6 +61,16 @@ impl<'a> Policies<'a> {
             self.fresh.remove(&option.id);
         }
         Ok(())
+    }
+
+    /// Where trainings are kept while they run.
+    pub(crate) fn trainings(&self) -> Option<&Path> {
+        self.library.trainings()
+    }
+
+    /// Notes the file of the training of the leg called `id`, which is finished.
+    pub(crate) fn note_training(&mut self, id: LegId, file: &Path) {
+        self.library.note_training(id, file);
     }
 
     /// Keeps what was learnt of `option`, in the library as well if it can be used again.

@@ -7,7 +7,7 @@ use sharp_rl::Progress;
 use sharp_space::{Occupancy, Pose};
 use thiserror::Error;
 
-use crate::learn::{LearningMonitor, LearntPolicy};
+use crate::learn::{LearningMonitor, LearntPolicy, TrainingFile, TrainingPoint};
 
 /// Where a plan begins and ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -156,6 +156,8 @@ pub trait Monitor: Sync {
     fn phase(&self, _phase: Phase) {}
     /// The training of an option took a step; several options may train at once.
     fn trained(&self, _option: &GuidedOption, _progress: &Progress<'_>) {}
+    /// The training of an option was evaluated; one that goes on tells its evaluations again.
+    fn evaluated(&self, _option: &GuidedOption, _point: &TrainingPoint) {}
     /// An option was learnt.
     fn learnt(&self, _option: &GuidedOption, _learnt: &LearntPolicy) {}
     /// Asked often; true ends the search as soon as possible. What was learnt is kept.
@@ -170,14 +172,23 @@ impl Monitor for () {}
 pub(crate) struct OptionMonitor<'a> {
     pub(crate) monitor: &'a dyn Monitor,
     pub(crate) option: &'a GuidedOption,
+    pub(crate) file: Option<&'a TrainingFile>,
 }
 
 impl LearningMonitor for OptionMonitor<'_> {
     fn should_stop(&self) -> bool {
-        self.monitor.should_stop()
+        self.monitor.should_stop() || self.file.is_some_and(TrainingFile::has_failed)
     }
 
     fn trained(&self, progress: &Progress<'_>) {
         self.monitor.trained(self.option, progress);
+    }
+
+    fn evaluated(&self, point: &TrainingPoint) {
+        self.monitor.evaluated(self.option, point);
+    }
+
+    fn training_file(&self) -> Option<&TrainingFile> {
+        self.file
     }
 }

@@ -157,7 +157,7 @@ fn relearn(
     // Training is for options that are weak themselves, and once only; how a tight start is left is not learnt.
     let may_train =
         old.gradient_steps == 0 && option.departure.is_none() && on_arrival.rate() < learner.train_below();
-    let monitor = OptionMonitor { monitor: problem.monitor, option };
+    let monitor = OptionMonitor { monitor: problem.monitor, option, file: None };
     let new = learner.improve(&task, beaten, may_train, &monitor).ok()??;
     let (env_steps, gradient_steps) =
         (new.env_steps + old.env_steps, new.gradient_steps + old.gradient_steps);

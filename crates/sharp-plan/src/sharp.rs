@@ -32,6 +32,8 @@ pub struct Sharp {
     settings: AbstractionSettings,
     method: Method,
     conditions: Conditions,
+    /// Whether the simulator was chosen, or is the method's.
+    has_own_simulator: bool,
     library: OptionLibrary,
     built: Option<Built>,
     /// What the library knows here, and which version of it.
@@ -107,6 +109,7 @@ impl Sharp {
             settings,
             method: Method::default(),
             conditions,
+            has_own_simulator: false,
             library: OptionLibrary::in_memory(),
             built: None,
             known: None,
@@ -114,9 +117,12 @@ impl Sharp {
         }
     }
 
-    /// The same with another method.
+    /// The same with another method, in its simulator unless another was chosen.
     #[must_use]
-    pub fn with_method(self, method: Method) -> Self {
+    pub fn with_method(mut self, method: Method) -> Self {
+        if !self.has_own_simulator {
+            self.conditions.simulator = self.world.simulator(method.simulator);
+        }
         Self { method, known: None, ..self }
     }
 
@@ -157,7 +163,8 @@ impl Sharp {
     /// The same with policies learnt and verified in forks of `simulator`, which may be anybody's.
     #[must_use]
     pub fn with_simulator(self, simulator: Box<dyn Simulator>) -> Self {
-        Self { conditions: self.conditions.with_simulator(simulator), ..self }
+        let conditions = self.conditions.with_simulator(simulator);
+        Self { conditions, has_own_simulator: true, ..self }
     }
 
     /// The same with the options of `library`, which also keeps what is learnt.

@@ -30,7 +30,7 @@ pub(crate) struct Settings {
     learning: String,
     noise: String,
     regions: String,
-    simulator: String,
+    simulator: Option<String>,
     library: Option<PathBuf>,
     seed: u64,
     time_limit: Option<f64>,
@@ -64,7 +64,7 @@ pub(crate) fn solve(
     let monitor = PyMonitor::new(progress);
     let solved = py.detach(|| -> Result<Solved, Raised> {
         let timed = TimedMonitor::new(Stopwatch::start("load"), limit, &monitor);
-        let mut solved = solve_problem(&problem, &wanted, settings.library.as_deref(), &timed)?;
+        let mut solved = solve_problem(&problem, &wanted, settings.library.as_deref().into(), &timed)?;
         solved.save_library()?;
         Ok(solved)
     });
@@ -143,8 +143,8 @@ impl Settings {
                 regions: self.regions.clone(),
                 metric: CellMetric::default(),
             },
+            simulator: self.simulator.as_deref().map_or(Ok(method.simulator), simulator)?,
             method,
-            simulator: simulator(&self.simulator)?,
             seed: self.seed,
         })
     }

@@ -15,6 +15,9 @@ const BETA_1: f32 = 0.9;
 const BETA_2: f32 = 0.999;
 /// `PyTorch`'s value; burn's own default is 1e-5.
 const EPSILON: f32 = 1e-8;
+/// A moment below is zero: it moves no parameter that is not as small itself. Those of units that are silent would decay into
+/// subnormal numbers, with which processors compute a hundred times as slowly: a fifth of a long training went into that.
+const NOTHING: f32 = 1e-30;
 
 impl Adam {
     /// Moments of `len` parameters before the first step.
@@ -36,11 +39,16 @@ impl Adam {
         let root_correction = (1.0 - f64::from(BETA_2).powi(steps)).sqrt().recip() as f32;
         let moments = self.first.iter_mut().zip(&mut self.second);
         for ((parameter, g), (first, second)) in parameters.iter_mut().zip(gradient).zip(moments) {
-            *first += (1.0 - BETA_1) * (g - *first);
-            *second += (1.0 - BETA_2) * (g * g - *second);
+            *first = or_zero(*first + (1.0 - BETA_1) * (g - *first));
+            *second = or_zero(*second + (1.0 - BETA_2) * (g * g - *second));
             *parameter -= step_size * *first / (second.sqrt() * root_correction + EPSILON);
         }
     }
+}
+
+/// `moment`, or zero if it is next to nothing; NaN stays.
+fn or_zero(moment: f32) -> f32 {
+    if moment.abs() < NOTHING { 0.0 } else { moment }
 }
 
 #[cfg(test)]
@@ -59,6 +67,18 @@ mod tests {
         for (value, expected) in parameters.iter().zip([0.9, 1.1, 1.0]) {
             assert!((value - expected).abs() < 1e-5, "{value}, expected {expected}");
         }
+    }
+
+    #[test]
+    fn moments_of_a_silent_unit_become_zero_and_never_subnormal() {
+        let (mut adam, mut parameters) = (Adam::new(1), [0.5]);
+        adam.step(0.01, &mut parameters, &[1e-3]);
+        for _ in 0..100_000 {
+            adam.step(0.01, &mut parameters, &[0.0]);
+            let is_sound = |moment: f32| moment == 0.0 || moment.is_normal();
+            assert!(is_sound(adam.first[0]) && is_sound(adam.second[0]), "{adam:?}");
+        }
+        assert_eq!((adam.first[0], adam.second[0]), (0.0, 0.0));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::environment::{Environment, Stream};
 use crate::error::TrainError;
 use crate::evaluation::Evaluation;
 use crate::sac_state::SacState;
-use crate::stop::StopReason;
+use crate::stop::{StopReason, StopRule};
 
 /// A learning algorithm with its settings and its budget.
 ///
@@ -41,6 +41,20 @@ pub trait Learner: fmt::Debug + Send + Sync {
         rng: &mut Stream,
         observer: &mut Observer<'_>,
     ) -> Result<Trained, TrainError>;
+
+    /// Continues the run that wrote `checkpoint` ([`Progress::checkpoint`]) on the environments of that run, bit for bit as
+    /// if it had not been interrupted. `None` if these bytes are not of this algorithm, or if it cannot continue.
+    ///
+    /// # Errors
+    /// As [`learn`](Self::learn), and if the environments or settings are not those of the run.
+    fn resume(
+        &self,
+        _checkpoint: &[u8],
+        _environments: &mut [Box<dyn Environment>],
+        _observer: &mut Observer<'_>,
+    ) -> Option<Result<Trained, TrainError>> {
+        None
+    }
 }
 
 /// Sees the progress of training. Breaking ends training.
@@ -102,6 +116,10 @@ pub struct Progress<'a> {
     ///
     /// Names are those of Stable-Baselines3 without `train/`. Empty before the first update.
     pub metrics: &'a [(&'static str, f64)],
+    /// Environment steps after which training ends; `None` if there is no such budget.
+    pub max_env_steps: Option<u64>,
+    /// The rule that ends it earlier; `None` if there is none, or one that has no name here.
+    pub stop: Option<StopRule>,
     pub(crate) checkpoint: Option<&'a dyn Fn() -> Vec<u8>>,
 }
 
@@ -119,6 +137,8 @@ impl<'a> Progress<'a> {
             recent_success_rate: 0.0,
             recent_steps: 0.0,
             metrics: &[],
+            max_env_steps: None,
+            stop: None,
             checkpoint: None,
         }
     }

@@ -29,6 +29,14 @@ impl LayerShape {
 /// `y = x wᵀ`: x is batch x inputs, w outputs x inputs, y batch x outputs.
 pub(crate) fn multiply(shape: LayerShape, x: &[f32], w: &[f32], y: &mut [f32]) {
     let LayerShape { batch, inputs, outputs } = shape;
+    match inputs {
+        // The lengths of small observations.
+        2 => return multiply_few::<2>(outputs, x, w, y),
+        3 => return multiply_few::<3>(outputs, x, w, y),
+        4 => return multiply_few::<4>(outputs, x, w, y),
+        5 => return multiply_few::<5>(outputs, x, w, y),
+        _ => {}
+    }
     if shape.is_narrow() {
         for (x, y) in x.chunks_exact(inputs).zip(y.chunks_exact_mut(outputs)) {
             matvec(w, x, y);
@@ -60,6 +68,13 @@ pub(crate) fn multiply_back(shape: LayerShape, dy: &[f32], w: &[f32], dx: &mut [
 /// `dw = dyᵀ x`: dy is batch x outputs, x batch x inputs, dw outputs x inputs.
 pub(crate) fn multiply_weights(shape: LayerShape, dy: &[f32], x: &[f32], dw: &mut [f32]) {
     let LayerShape { batch, inputs, outputs } = shape;
+    match inputs {
+        2 => return multiply_few_weights::<2>(outputs, dy, x, dw),
+        3 => return multiply_few_weights::<3>(outputs, dy, x, dw),
+        4 => return multiply_few_weights::<4>(outputs, dy, x, dw),
+        5 => return multiply_few_weights::<5>(outputs, dy, x, dw),
+        _ => {}
+    }
     if shape.is_narrow() {
         dw.fill(0.0);
         for (dy, x) in dy.chunks_exact(outputs).zip(x.chunks_exact(inputs)) {
@@ -72,6 +87,29 @@ pub(crate) fn multiply_weights(shape: LayerShape, dy: &[f32], x: &[f32], dw: &mu
     let dy = columns(dy, outputs, batch);
     let x = rows(x, batch, inputs);
     product(&dy, &x, dw, outputs, inputs);
+}
+
+/// [`multiply`] of so few inputs that a row of weights is shorter than a register: the compiler unrolls the rows.
+fn multiply_few<const INPUTS: usize>(outputs: usize, x: &[f32], w: &[f32], y: &mut [f32]) {
+    let (x, w) = (x.as_chunks::<INPUTS>().0, w.as_chunks::<INPUTS>().0);
+    for (x, y) in x.iter().zip(y.chunks_exact_mut(outputs)) {
+        for (w, y) in w.iter().zip(y) {
+            *y = x.iter().zip(w).fold(0.0, |sum, (x, w)| sum + x * w);
+        }
+    }
+}
+
+/// [`multiply_weights`] of so few inputs.
+fn multiply_few_weights<const INPUTS: usize>(outputs: usize, dy: &[f32], x: &[f32], dw: &mut [f32]) {
+    dw.fill(0.0);
+    let dw = dw.as_chunks_mut::<INPUTS>().0;
+    for (dy, x) in dy.chunks_exact(outputs).zip(x.as_chunks::<INPUTS>().0) {
+        for (d, dw) in dy.iter().zip(&mut *dw) {
+            for (dw, x) in dw.iter_mut().zip(x) {
+                *dw += d * x;
+            }
+        }
+    }
 }
 
 /// `y = w x` for one vector.
@@ -161,9 +199,16 @@ mod tests {
 
     #[test]
     fn products_follow_the_definition_on_wide_and_narrow_sides() {
-        for (batch, inputs, outputs) in
-            [(32, 33, 64), (32, 64, 1), (32, 2, 64), (3, 17, 9), (1, 1, 1), (19, 20, 8), (7, 6, 9)]
-        {
+        for (batch, inputs, outputs) in [
+            (32, 33, 64),
+            (32, 64, 1),
+            (32, 2, 64),
+            (9, 5, 20),
+            (3, 17, 9),
+            (1, 1, 1),
+            (19, 20, 8),
+            (7, 6, 9),
+        ] {
             check(batch, inputs, outputs);
         }
     }

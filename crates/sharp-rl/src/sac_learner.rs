@@ -57,6 +57,16 @@ impl Learner for SacLearner {
             SacStart::Checkpoint(state) => resume(environments, (**state).clone(), &self.settings, observer),
         }
     }
+
+    fn resume(
+        &self,
+        checkpoint: &[u8],
+        environments: &mut [Box<dyn Environment>],
+        observer: &mut Observer<'_>,
+    ) -> Option<Result<Trained, TrainError>> {
+        let state = TrainState::from_bytes(checkpoint).ok()?;
+        Some(resume(environments, state, &self.settings, observer))
+    }
 }
 
 #[cfg(test)]
@@ -117,7 +127,10 @@ mod tests {
             ControlFlow::Continue(())
         };
         let whole = fresh.learn(&mut boxed(), &mut rng(), &mut save_at_800).expect("trains");
-        let state = TrainState::from_bytes(&saved.expect("saved")).expect("own bytes");
+        let saved = saved.expect("saved");
+        assert_eq!(fresh.resume(&saved, &mut boxed(), &mut quiet), Some(Ok(whole.clone())));
+        assert_eq!(fresh.resume(b"nothing", &mut boxed(), &mut quiet), None, "of no run");
+        let state = TrainState::from_bytes(&saved).expect("own bytes");
         let resumed = fresh.clone().with_start(SacStart::Checkpoint(Box::new(state)));
         assert_eq!(resumed.learn(&mut boxed(), &mut rng(), &mut quiet), Ok(whole.clone()));
 

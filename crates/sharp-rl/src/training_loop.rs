@@ -301,6 +301,8 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
             recent_success_rate: mean(|episode| f64::from(u8::from(episode.success))),
             recent_steps: mean(|episode| episode.steps as f64),
             metrics: if self.state.updates > 0 { &metrics } else { &[] },
+            max_env_steps: Some(self.settings.max_env_steps),
+            stop: Some(self.settings.stop),
             ..Progress::new(&self.state.sac.actor, self.state.env_steps)
         };
         observer(&progress.with_checkpoint(&checkpoint)).is_break()

@@ -13,6 +13,7 @@ mod missing;
 mod noise;
 mod ompl;
 mod page;
+mod paper;
 mod phases;
 mod reuse;
 mod rows;
@@ -28,6 +29,7 @@ use self::figure::Figure;
 use crate::result::ResultLine;
 
 pub use methods::totals;
+pub use paper::{PaperLeg, PaperLine, PaperRow, paper_rows, write_paper};
 pub use tables::table;
 
 /// What a report is made from.

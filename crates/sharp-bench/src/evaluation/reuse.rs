@@ -23,8 +23,8 @@ const PAPER: [(&str, f64, f64); 7] = [
     ("g", 0.50, 0.42),
 ];
 
-/// What the paper reports of `options` in `env`.
-fn paper(env: &str, options: &str) -> Option<f64> {
+/// What the paper reports of `options` in `env`, a share.
+pub(super) fn paper(env: &str, options: &str) -> Option<f64> {
     let (_, centroid, interface) = PAPER.iter().find(|(name, ..)| *name == env)?;
     match options {
         "centroid" => Some(*centroid),

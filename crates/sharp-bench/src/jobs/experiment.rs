@@ -145,7 +145,7 @@ impl SharpSettings {
 
     /// Whether every option is learnt from nothing, which takes hours.
     fn trains_everything(&self) -> bool {
-        self.method().is_some_and(|method| method.saves_at_once)
+        self.method().is_some_and(|method| method.keeps_trainings)
     }
 }
 

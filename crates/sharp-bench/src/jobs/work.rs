@@ -23,14 +23,12 @@ use crate::named::NamedProblem;
 use crate::pictures;
 use crate::reports::{BaselineReport, RunReport, SolveReport};
 use crate::result::ResultLine;
-use crate::solve::{AbstractionRequest, SolveSettings, solve};
+use crate::solve::{AbstractionRequest, SolveFolders, SolveSettings, solve};
 use crate::stopwatch::{Stopwatch, TimedMonitor, clock_us};
 use crate::times::{DecisionTimes, Reuse, SolveTimes};
 
 /// Where everything is driven: walls to push and graze.
 const SIMULATOR: SimulatorKind = SimulatorKind::Planar;
-/// The simulator of learning and verification: not the one that evaluates.
-const TRAINING_SIMULATOR: SimulatorKind = SimulatorKind::Kinematic;
 /// Executions that a prediction is held against: enough to tell one that is three points off from luck.
 const CALIBRATION_EPISODES: u32 = 1000;
 
@@ -164,19 +162,21 @@ impl JobTask<'_> {
                 regions: sharp.regions.clone(),
                 metric: CellMetric::Geodesic,
             },
+            simulator: method.simulator,
             method,
-            simulator: TRAINING_SIMULATOR,
             seed,
         };
-        let mut solved = solve(&problem, &settings, Some(library), &monitor)?;
+        // They outlive the folder of an attempt.
+        let trainings = self.step.folder().with_extension("training");
+        let folders = SolveFolders { library: Some(library), trainings: Some(&trainings) };
+        let mut solved = solve(&problem, &settings, folders, &monitor)?;
         if self.monitor.should_stop() {
             return Ok(None);
         }
         let mut line = with_solution(self.blank(), &solved.report);
         // The folder gets its name when the step is done.
         solved.write(folder, &self.step.folder())?;
-        solved.save_library()?;
-        if let Some(plan) = solved.plan {
+        if let Some(plan) = solved.plan.take() {
             let plan = Arc::new(plan);
             let mut stopwatch = Stopwatch::start("drive");
             let run = drive(
@@ -191,6 +191,7 @@ impl JobTask<'_> {
                 run_settings(&plan, sharp, CALIBRATION_EPISODES, Seed(seed).child("calibration", 0));
             line.calibration = Some(sharp_plan::success(&run_plan(&plan, &settings, &|| 0.0)));
         }
+        solved.save_library()?;
         Ok(Some(line))
     }
 

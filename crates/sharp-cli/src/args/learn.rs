@@ -21,9 +21,10 @@ pub(crate) struct Learn {
     /// none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
-    /// The simulator in which policies are learnt; the others are described at `run`.
-    #[arg(long, default_value = "kinematic", value_name = "kinematic|rapier2d|rapier3d")]
-    pub(crate) simulator: String,
+    /// The simulator in which policies are learnt; they are described at `run` [default: kinematic; with --learning paper
+    /// rapier2d].
+    #[arg(long, value_name = "kinematic|rapier2d|rapier3d")]
+    pub(crate) simulator: Option<String>,
     /// Where options are kept [default: a cache folder].
     #[arg(long, value_name = "DIR")]
     pub(crate) library: Option<String>,

@@ -12,7 +12,7 @@ use sharp_space::Seed;
 use crate::args::Abstract;
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::progress::{SolveMonitor, spinner};
+use crate::progress::SolveMonitor;
 
 /// `sharp.abstract/1`.
 #[derive(Debug, Serialize)]
@@ -36,7 +36,7 @@ pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failur
     let stopwatch = Stopwatch::start("load");
     let map = input::map(&args.map)?;
     let world = named::world(&map, named::robot(&args.abstraction.robot)?);
-    let spinner = SolveMonitor::new(spinner("building the abstraction"), None);
+    let spinner = SolveMonitor::new("building the abstraction", None);
     let monitor = TimedMonitor::new(stopwatch, None, &spinner);
     let (sharp, file) = prepare(world, &args.abstraction.request(), None, &monitor)?;
     let (world, abstraction) = (sharp.world(), file.abstraction());

@@ -22,10 +22,11 @@ pub(crate) fn run(args: &Learn, seed: u64, json: bool) -> Result<Exit, Failure> 
     let stopwatch = Stopwatch::start("learn");
     let map = input::map(&args.map)?;
     let place = NamedWorld::new(&map, &args.abstraction.robot, &args.noise)?;
+    let method = Method::by_name(args.learning.name()).expect("every word names a method");
     let settings = SolveSettings {
         abstraction: args.abstraction.request(),
-        method: Method::by_name(args.learning.name()).expect("every word names a method"),
-        simulator: input::simulator(&args.simulator)?,
+        simulator: input::training_simulator(args.simulator.as_deref(), &method)?,
+        method,
         seed,
     };
     args.out.as_deref().map_or(Ok(()), |folder| input::check_out("--out", folder))?;

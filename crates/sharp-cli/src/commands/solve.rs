@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use sharp_bench::{NamedProblem, SolveReport, SolveSettings, Stopwatch, TimedMonitor, solve, solve_tour};
+use sharp_bench::{
+    NamedProblem, SolveFolders, SolveReport, SolveSettings, Stopwatch, TimedMonitor, solve, solve_tour,
+};
 use sharp_plan::{Method, Monitor, OptionLibrary, Tour};
 use sharp_space::Pose;
 
@@ -13,8 +15,10 @@ use crate::commands::prior::prior_file;
 use crate::commands::show;
 use crate::input::{self, HeadingRule};
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::progress::{SolveMonitor, is_interrupted, spinner};
+use crate::progress::{SolveMonitor, is_interrupted};
 
+/// The folder, beside a plan, of trainings that are under way.
+const TRAININGS: &str = "training";
 /// Runs that `--verify` may ask for.
 const EPISODES_MAX: u32 = 1_000_000;
 
@@ -40,10 +44,12 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     if let Some(file) = &args.prior {
         problem.world = problem.world.with_prior(prior_file(file)?);
     }
+    let method = method(args)?;
+    let keeps_trainings = method.keeps_trainings;
     let settings = SolveSettings {
         abstraction: args.abstraction.request(),
-        method: method(args)?,
-        simulator: input::simulator(&args.simulator)?,
+        simulator: input::training_simulator(args.simulator.as_deref(), &method)?,
+        method,
         seed,
     };
     args.out.as_deref().map_or(Ok(()), |folder| input::check_out("--out", folder))?;
@@ -51,14 +57,16 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
         input::check_out("--show", folder)?;
     }
     let library = input::library(args.library.as_deref());
+    let trainings = args.out.as_deref().filter(|_| library.is_none()).map(|folder| folder.join(TRAININGS));
+    let folders = SolveFolders { library: library.as_deref(), trainings: trainings.as_deref() };
 
     let vias = args.via.iter().map(|via| input::pose("--via", via, HeadingRule::Free));
     let vias = vias.collect::<Result<Vec<Pose>, _>>()?;
 
-    let spinner = SolveMonitor::new(spinner("searching"), args.tensorboard.as_deref());
+    let spinner = SolveMonitor::new("searching", args.tensorboard.as_deref());
     let monitor = TimedMonitor::new(stopwatch, time_limit, &spinner);
     let (report, is_time_up) = if vias.is_empty() {
-        let mut solved = solve(&problem, &settings, library.as_deref(), &monitor)?;
+        let mut solved = solve(&problem, &settings, folders, &monitor)?;
         let is_time_up = monitor.should_stop();
         spinner.finish();
         hold_to(&mut solved.report, args.min_success);
@@ -67,11 +75,14 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
             solved.write(&folder, &folder)?;
             shown(args, (&tour, &problem.map), Some(solved.library()), (seed, &folder))?;
         }
-        solved.save_library()?;
+        // Trainings that are kept apart are gone on with by the same call, which must find the library as this one did.
+        if !(is_interrupted() && keeps_trainings) {
+            solved.save_library()?;
+        }
         (solved.report, is_time_up)
     } else {
         let goals = [vias, vec![query.goal]].concat();
-        let mut solved = solve_tour(&problem, &goals, &settings, library.as_deref(), &monitor)?;
+        let mut solved = solve_tour(&problem, &goals, &settings, folders, &monitor)?;
         let is_time_up = monitor.should_stop();
         spinner.finish();
         hold_to(&mut solved.report, args.min_success);

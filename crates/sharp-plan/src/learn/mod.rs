@@ -8,6 +8,7 @@ mod options;
 mod paper;
 mod prior_only;
 mod selection;
+mod training;
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -24,8 +25,10 @@ pub(crate) use options::{initial_states, learn_missing, task};
 pub use paper::PaperProtocol;
 pub use prior_only::PriorOnly;
 pub use selection::Selection;
+pub use training::{InterruptedTraining, Training, TrainingFile, TrainingPoint};
 
 use crate::conditions::Conditions;
+use crate::files::FileError;
 
 /// Gives an option its policy. Implement [`learn`](Self::learn); improving is for those who can.
 pub trait OptionLearner: Debug + Send + Sync {
@@ -79,13 +82,15 @@ pub struct LearntPolicy {
     pub env_steps: u64,
     /// Gradient steps that learning took.
     pub gradient_steps: u64,
+    /// How it was trained, where it was.
+    pub training: Option<Training>,
 }
 
 impl LearntPolicy {
     /// `policy` with its `estimate`, without any training.
     #[must_use]
     pub const fn untrained(policy: OptionPolicy, estimate: SuccessEstimate) -> Self {
-        Self { policy, estimate, env_steps: 0, gradient_steps: 0 }
+        Self { policy, estimate, env_steps: 0, gradient_steps: 0, training: None }
     }
 
     /// Stands for an option that cannot be learnt: it never succeeds.
@@ -112,6 +117,8 @@ pub enum LearnFailure {
     Stopped,
     /// Something was wrong with the task: a NaN, an impossible observation.
     Broken(TrainError),
+    /// A file of an interrupted training cannot be used.
+    File(FileError),
 }
 
 /// Watches the learning of one option and may stop it. A closure only stops.
@@ -120,6 +127,12 @@ pub trait LearningMonitor: Sync {
     fn should_stop(&self) -> bool;
     /// A training took a step.
     fn trained(&self, _progress: &Progress<'_>) {}
+    /// A training was evaluated; one that goes on tells its evaluations again.
+    fn evaluated(&self, _point: &TrainingPoint) {}
+    /// Where the training is kept while it runs, so that it can go on after a kill; `None` for nowhere.
+    fn training_file(&self) -> Option<&TrainingFile> {
+        None
+    }
 }
 
 impl<F: Fn() -> bool + Sync> LearningMonitor for F {

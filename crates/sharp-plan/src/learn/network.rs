@@ -3,12 +3,21 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use sharp_drive::{Link, NetworkPolicy, OptionPolicy, OptionTask, PolicyInterface, Scenario, SingleOption};
+use sharp_drive::{
+    Link, NetworkPolicy, OptionPolicy, OptionTask, PolicyInterface, Scenario, SingleOption, SuccessCount,
+};
 use sharp_guide::Reward;
-use sharp_rl::{Environment, Learner, Progress};
+use sharp_rl::{Actor, Environment, Evaluation, Learner, Progress};
 use sharp_sim::RobotState;
 
-use super::{LearnFailure, LearningMonitor, LearningTask, LearntPolicy};
+use super::{
+    InterruptedTraining, LearnFailure, LearningMonitor, LearningTask, LearntPolicy, Training, TrainingFile,
+    TrainingPoint,
+};
+
+/// A training is kept after every evaluation, and where evaluations are rare after so many steps: ten seconds of the paper's
+/// mode.
+const SAVE_EVERY: u64 = 2_000;
 
 /// How a network is trained.
 #[derive(Clone, Debug)]
@@ -20,7 +29,8 @@ pub(crate) struct NetworkTraining<'a> {
     pub(crate) environments: u64,
 }
 
-/// Trains a network on the option of `task` and estimates how often it succeeds.
+/// Trains a network on the option of `task` and estimates how often it succeeds. Goes on with what `monitor` keeps of an
+/// interrupted training.
 pub(crate) fn train_network(
     task: &LearningTask<'_>,
     training: &NetworkTraining<'_>,
@@ -32,20 +42,75 @@ pub(crate) fn train_network(
         Box::new(OptionTask::new(Arc::clone(&source) as _, task.seed.child("environment", index)))
     };
     let mut environments: Vec<_> = (0..training.environments).map(environment).collect();
+    let interrupted = monitor.training_file().map_or(Ok(None), TrainingFile::interrupted);
+    let InterruptedTraining { checkpoint, mut points } =
+        interrupted.map_err(LearnFailure::File)?.unwrap_or_default();
+    for point in &points {
+        monitor.evaluated(point);
+    }
+    let (mut is_due, mut saved_at) = (false, 0);
     let mut observer = |progress: &Progress<'_>| {
         monitor.trained(progress);
-        if monitor.should_stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if let Some(evaluation) = &progress.evaluation {
+            let point = training_point(task, training, progress.actor, evaluation);
+            monitor.evaluated(&point);
+            points.push(point);
+        }
+        let should_stop = monitor.should_stop();
+        is_due |= progress.env_steps >= saved_at + SAVE_EVERY;
+        if let Some(file) = monitor.training_file().filter(|_| is_due || should_stop)
+            // A run may end with an evaluation, so none continues from one.
+            && progress.evaluation.is_none()
+            && let Some(checkpoint) = progress.checkpoint()
+        {
+            file.save(&checkpoint, &points);
+            (is_due, saved_at) = (false, progress.env_steps);
+        }
+        is_due |= progress.evaluation.is_some();
+        if should_stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let mut rng = task.seed.stream("sac", 0);
-    let trained = training.learner.learn(&mut environments, &mut rng, &mut observer);
+    let trained = match training.learner.resume(&checkpoint, &mut environments, &mut observer) {
+        Some(trained) => trained,
+        None => {
+            let mut rng = task.seed.stream("sac", 0);
+            training.learner.learn(&mut environments, &mut rng, &mut observer)
+        }
+    };
     let trained = trained.map_err(LearnFailure::Broken)?;
     if monitor.should_stop() {
         return Err(LearnFailure::Stopped);
     }
-    let network = NetworkPolicy::new(training.interface, Arc::new(trained.actor));
-    let policy = OptionPolicy::Network(network);
-    let estimate = task.estimate(&policy);
-    Ok(LearntPolicy { policy, estimate, env_steps: trained.env_steps, gradient_steps: trained.updates })
+    let policy = network_policy(training, &trained.actor);
+    let record = Training { stop: trained.stop, mean_return: trained.evaluation.mean_return, points };
+    Ok(LearntPolicy {
+        env_steps: trained.env_steps,
+        gradient_steps: trained.updates,
+        training: Some(record),
+        ..LearntPolicy::untrained(policy.clone(), task.estimate(&policy))
+    })
+}
+
+fn network_policy(training: &NetworkTraining<'_>, actor: &Actor) -> OptionPolicy {
+    OptionPolicy::Network(NetworkPolicy::new(training.interface, Arc::new(actor.clone())))
+}
+
+/// What `evaluation` showed of `actor`, and what it holds where a contact is a failure.
+fn training_point(
+    task: &LearningTask<'_>,
+    training: &NetworkTraining<'_>,
+    actor: &Actor,
+    evaluation: &Evaluation,
+) -> TrainingPoint {
+    let Evaluation { episodes, successes, mean_return, env_steps, .. } = *evaluation;
+    let success = SuccessCount { episodes: episodes as u32, successes: successes as u32 };
+    let without_contact = if training.reward.contact_ends() {
+        success
+    } else {
+        let policy = network_policy(training, actor);
+        let trial = task.monte_carlo(success.episodes, "without contact", env_steps);
+        trial.estimate(&task.drivers(&policy)[..1], &task.states).count
+    };
+    TrainingPoint { env_steps, mean_return, success, without_contact }
 }
 
 fn scenario(task: &LearningTask<'_>, training: &NetworkTraining<'_>) -> Scenario {

@@ -1,17 +1,18 @@
 //! Lines 11 and 13 to 19 of Algorithm 1: what a plan lacks is taken from the library or learnt.
 
-use std::sync::Arc;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use rayon::prelude::*;
 use sharp_drive::{Driver, InitialStates, SuccessCount, SuccessEstimate};
 use sharp_guide::{GuidedOption, Role};
 use sharp_sim::RobotState;
 use sharp_space::Seed;
 
-use super::{LearnFailure, LearningTask, LearntPolicy};
+use super::{LearnFailure, LearningTask, LearntPolicy, TrainingFile};
 use crate::files::FileError;
 use crate::method::LearningOrder;
-use crate::policies::Policies;
+use crate::policies::{Policies, corridor};
 use crate::problem::PlanningProblem;
 use crate::query::{OptionMonitor, Phase};
 use crate::search::Search;
@@ -85,8 +86,9 @@ fn learn_chained(
         if policies.get(option.id).is_none() {
             let states = initial_states(problem, option, seed).with_arrivals(arrivals.clone());
             let task = LearningTask { next, ..task(problem, option, states, seed) };
-            let monitor = OptionMonitor { monitor: problem.monitor, option };
+            let monitor = OptionMonitor { monitor: problem.monitor, option, file: None };
             let result = problem.method.learner.learn(&task, &monitor);
+            announce(problem, option, &result);
             if !take(problem, option, result, search, policies)? {
                 return Ok(false);
             }
@@ -98,25 +100,103 @@ fn learn_chained(
     Ok(true)
 }
 
-/// Each option on its own and all at once: the paper's way.
+/// Each option on its own and side by side, one a thread: the paper's way.
 fn learn_independent(
     problem: &PlanningProblem<'_>,
     missing: &[&Arc<GuidedOption>],
     search: &Search<'_>,
     policies: &mut Policies<'_>,
 ) -> Result<bool, FileError> {
-    let learn = |option: &&Arc<GuidedOption>| {
+    let folder = policies.trainings().map(Path::to_owned);
+    let learn = |option: &Arc<GuidedOption>| {
         let seed = option_seed(problem, option);
-        let task = task(problem, option, initial_states(problem, option, seed), seed);
-        let monitor = OptionMonitor { monitor: problem.monitor, option };
-        problem.method.learner.learn(&task, &monitor)
+        let file = folder
+            .as_deref()
+            .map(|folder| TrainingFile::new(folder, option.id, &decides_training(problem, option, seed)));
+        let result = learn_or_find(problem, option, seed, file.as_ref());
+        announce(problem, option, &result);
+        // The others go on: what can be learnt is learnt.
+        (result, file)
     };
-    let results: Vec<_> = missing.par_iter().map(learn).collect();
     let mut finished = true;
-    for (option, result) in missing.iter().zip(results) {
-        finished &= take(problem, option, result, search, policies)?;
+    for (option, (result, file)) in missing.iter().zip(side_by_side(missing, learn)) {
+        let is_learnt = take(problem, option, result, search, policies)?;
+        finished &= is_learnt;
+        let Some(file) = file else { continue };
+        if is_learnt {
+            policies.note_training(option.id, file.path());
+        }
+        file.into_failure().map_or(Ok(()), Err)?;
     }
     Ok(finished)
+}
+
+/// Does `learn` with each of `options` on as many threads as there are; what comes first on a long list are the longest
+/// guides, which take longest to learn. The results are in the order of `options`.
+fn side_by_side<R: Send>(
+    options: &[&Arc<GuidedOption>],
+    learn: impl Fn(&Arc<GuidedOption>) -> R + Sync,
+) -> Vec<R> {
+    let mut order: Vec<usize> = (0..options.len()).collect();
+    let length_m = |index: &usize| options[*index].guide.length_m();
+    order.sort_by(|a, b| length_m(b).total_cmp(&length_m(a)));
+    let results: Vec<Mutex<Option<R>>> = options.iter().map(|_| Mutex::default()).collect();
+    let next = AtomicUsize::new(0);
+    // A thread that waits for a part of an estimate must not begin another option meanwhile, as it might with a parallel
+    // iterator: so each thread has one task, which takes option after option.
+    rayon::scope(|scope| {
+        for _ in 0..rayon::current_num_threads().min(options.len()) {
+            scope.spawn(|_| {
+                while let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let result = learn(options[index]);
+                    *results[index].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+                }
+            });
+        }
+    });
+    let done = |result: Mutex<Option<R>>| result.into_inner().unwrap_or_else(PoisonError::into_inner);
+    results.into_iter().map(|result| done(result).expect("every option had its turn")).collect()
+}
+
+/// Learns `option`, unless `file` has what an interrupted solve learnt.
+fn learn_or_find(
+    problem: &PlanningProblem<'_>,
+    option: &Arc<GuidedOption>,
+    seed: Seed,
+    file: Option<&TrainingFile>,
+) -> Result<LearntPolicy, LearnFailure> {
+    let found = file.map_or(Ok(None), TrainingFile::finished).map_err(LearnFailure::File)?;
+    if let Some(learnt) = found {
+        return Ok(learnt);
+    }
+    if problem.monitor.should_stop() {
+        return Err(LearnFailure::Stopped);
+    }
+    let task = task(problem, option, initial_states(problem, option, seed), seed);
+    let monitor = OptionMonitor { monitor: problem.monitor, option, file };
+    let learnt = problem.method.learner.learn(&task, &monitor)?;
+    file.map_or(Ok(()), |file| file.finish(&learnt)).map_err(LearnFailure::File)?;
+    Ok(learnt)
+}
+
+/// A text of everything that decides the training of `option`, apart from map and simulator.
+fn decides_training(problem: &PlanningProblem<'_>, option: &GuidedOption, seed: Seed) -> String {
+    let PlanningProblem { world, method, conditions, query, .. } = problem;
+    let start = (option.id.role() == Role::First).then_some(query.start);
+    let corridor = corridor(option, &world.grid);
+    let (learner, episodes) = (&method.learner, method.estimate_episodes);
+    format!("{:?} {:?} {corridor} {start:?} {seed:?} {learner:?} {episodes}", world.robot, conditions.noise)
+}
+
+/// Tells the monitor what was learnt of `option`.
+fn announce(
+    problem: &PlanningProblem<'_>,
+    option: &Arc<GuidedOption>,
+    result: &Result<LearntPolicy, LearnFailure>,
+) {
+    if let Ok(learnt) = result {
+        problem.monitor.learnt(option, learnt);
+    }
 }
 
 /// Keeps what was learnt of `option`; false if learning was stopped.
@@ -131,9 +211,9 @@ fn take(
         Ok(learnt) => learnt,
         Err(LearnFailure::Stopped) => return Ok(false),
         // A broken task cannot be learnt: its edge goes, the search goes on.
+        Err(LearnFailure::File(error)) => return Err(error),
         Err(LearnFailure::Broken(_)) => LearntPolicy::useless(&problem.world.robot),
     };
-    problem.monitor.learnt(option, &learnt);
     // The option of a plan may have been joined to its neighbours; the library keeps it as it is alone.
     policies.keep(search.option(option.id).unwrap_or(option), learnt, &problem.world.grid)?;
     Ok(true)

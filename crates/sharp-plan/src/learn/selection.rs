@@ -102,7 +102,7 @@ impl OptionLearner for Selection {
         Ok(chosen.map(|(judged, policy)| {
             let estimate = task.estimate_alone(&policy, judged);
             let (env_steps, gradient_steps) = effort;
-            LearntPolicy { policy, estimate, env_steps, gradient_steps }
+            LearntPolicy { env_steps, gradient_steps, ..LearntPolicy::untrained(policy, estimate) }
         }))
     }
 

@@ -385,7 +385,7 @@ def solve(
     learning: str = "fast",
     noise: str = "nominal",
     regions: str = "net",
-    simulator: str = "kinematic",
+    simulator: str | None = None,
     library: PathLike | None = None,
     seed: int = 1,
     time_limit: float | None = None,
