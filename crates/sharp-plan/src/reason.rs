@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use rayon::prelude::*;
 use sharp_drive::World;
 use sharp_guide::ridge_routes;
 use sharp_space::{Cell, GridFrame, Heading, Occupancy, Point, Pose, trig};
@@ -63,7 +64,11 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
         let turn_rad = f64::from(i) * std::f64::consts::TAU / f64::from(HEADINGS);
         Pose::at(query.start.position, Heading::new(query.start.heading.radians() + turn_rad))
     };
-    if !(1..HEADINGS).map(turned).any(|start| world.geometry.is_free(start) && leads_on(start)) {
+    if !(1..HEADINGS)
+        .into_par_iter()
+        .map(turned)
+        .any(|start| world.geometry.is_free(start) && leads_on(start))
+    {
         return None;
     }
     let needs = if model.can_turn_in_place() {
