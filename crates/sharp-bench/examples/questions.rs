@@ -27,7 +27,7 @@ use sharp_options::OptionKind;
 use sharp_plan::{Answer, Method, Plan, Query, RunSettings, run, success};
 use sharp_rbvd::CellMetric;
 use sharp_sim::SimulatorKind;
-use sharp_space::{Pose, Seed};
+use sharp_space::{CollisionChecker, Pose, Seed};
 
 /// Executions that a prediction is compared with.
 const EXECUTIONS: u32 = 1000;
@@ -111,6 +111,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             at(1.0)
         );
     }
+    let predicted: f64 = plans.iter().map(|plan| plan.solution.success()).sum();
+    println!("mean predicted success {:.4}", predicted / plans.len().max(1) as f64);
     let mean_ms = phases.map(|seconds| 1e3 * seconds / asked.len() as f64);
     println!(
         "mean in ms: search {:.2}, guides {:.2}, learning {:.2}, odds {:.2}",
@@ -145,7 +147,9 @@ fn random_queries(place: &NamedWorld, count: usize, seed: u64) -> Vec<Query> {
         };
         let query = Query { start: pose(), goal: pose() };
         let is_far = query.start.distance_m(&query.goal) >= least_m;
-        if is_far && query.check(world).is_ok() {
+        // What is wrong with an end takes long to say.
+        let is_free = |pose: &Pose| world.geometry.is_free(*pose);
+        if is_far && is_free(&query.start) && is_free(&query.goal) && query.check(world).is_ok() {
             queries.push(query);
         }
     }

@@ -19,7 +19,7 @@ use crate::odds::{ComposedOdds, refine};
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Phase;
-use crate::reason::{is_joined, obstruction, unturned};
+use crate::reason::{is_joined, is_shut, obstruction, unturned};
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
 use crate::verify::{PlannedOption, Solution, composed, predict, verify};
@@ -33,6 +33,8 @@ const COMPOSED_MAX: usize = 2;
 /// Composed plans are compared with the direct way if they succeed less often than this as a whole, or between their first
 /// and last pieces: it takes half of the time of an answer to guide and to drive, and is seldom better where they do well.
 const COMPOSED_WELL: [f64; 2] = [0.95, 0.98];
+/// And only if start and goal are no further apart, metres: the guide of a longer way takes longer than the rest of an answer.
+const COMPOSED_DIRECT_M: f64 = 25.0;
 
 /// A plan that succeeds less often is no plan, share of runs.
 const LEAST_SUCCESS: f64 = 0.01;
@@ -75,8 +77,8 @@ pub(crate) fn solve_with(
     let outcome = algorithm_1(problem, abstraction, library, known);
     let patient = problem.method.patient();
     let outcome = match (outcome, &patient) {
-        // What quick guides cannot reach may be reached by manoeuvring.
-        (Ok(Outcome::NoPlan(_)), Some(method)) => {
+        // What quick guides cannot reach may be reached by manoeuvring, unless the robot does not fit.
+        (Ok(Outcome::NoPlan(_)), Some(method)) if !is_shut(problem.world, &problem.query) => {
             algorithm_1(&PlanningProblem { method, ..*problem }, abstraction, library, known)
         }
         (outcome, _) => outcome,
@@ -151,7 +153,8 @@ fn algorithm_1(
             false => verify(problem, &p, &policies),
         };
         verified += 1;
-        if !is_composed || solution.composed.as_ref().is_some_and(fails_often) {
+        let is_near = query.start.distance_m(&query.goal) <= COMPOSED_DIRECT_M;
+        if !is_composed || (is_near && solution.composed.as_ref().is_some_and(fails_often)) {
             most += usize::from(search.offer_direct() && is_composed);
         }
         charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);

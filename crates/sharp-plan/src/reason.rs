@@ -46,6 +46,12 @@ pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
     })
 }
 
+/// Whether the robot fits through no way from start to goal, whatever it does.
+pub(crate) fn is_shut(world: &World, query: &Query) -> bool {
+    let robot_m = 2.0 * world.robot.footprint.inscribed_radius_m();
+    narrowest_place(world, query).is_none_or(|place| width_at(world, place) < robot_m)
+}
+
 /// Whether the headings are what is in the way: the robot finds no manoeuvre from its heading at the start, though a robot that
 /// looks another way there would get through, or none to the heading that the goal `asks_heading` for. `None` where they are not.
 pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Option<String> {
@@ -228,6 +234,7 @@ mod tests {
         let (world, query) = rooms(0);
         let reason = obstruction(&world, &query).expect("no way");
         assert!(reason.contains("separate parts"), "{reason}");
+        assert!(is_shut(&world, &query), "nothing leads through");
     }
 
     #[test]
@@ -268,5 +275,7 @@ mod tests {
         assert!(reason.contains("the husky is 0.67 m wide"), "{reason}");
         let (world, query) = rooms(12);
         assert_eq!(obstruction(&world, &query), None, "a door of 1.2 m leaves room");
+        let is_shut = [6, 7, 12].map(|door| rooms(door)).map(|(world, query)| is_shut(&world, &query));
+        assert_eq!(is_shut, [true, false, false], "doors of 0.6, 0.7 and 1.2 m for a robot of 0.67 m");
     }
 }
