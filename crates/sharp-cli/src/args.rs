@@ -133,6 +133,8 @@ pub(crate) enum Learning {
     Fast,
     /// The paper's protocol.
     Paper,
+    /// The same, but a training ends at a success of 95 %, not at a mean return of 500.
+    PaperSuccess,
     /// The shipped prior as it is, certified: what learning on the map is worth.
     Prior,
 }
@@ -142,6 +144,7 @@ impl Learning {
         match self {
             Self::Fast => "fast",
             Self::Paper => "paper",
+            Self::PaperSuccess => "paper-success",
             Self::Prior => "prior",
         }
     }

@@ -128,7 +128,11 @@ fn training_text(
             text += &format!(" (stops at {wanted:.0})");
         }
         let [success, without] = [point.success, point.without_contact].map(|count| 100.0 * count.rate());
-        text += &format!(", arrives {success:.0} %, without contact {without:.0} %");
+        text += &format!(", arrives {success:.0} %");
+        if let Some(StopRule::Success { rate: wanted, .. }) = progress.stop {
+            text += &format!(" (stops at {:.0} %)", 100.0 * wanted);
+        }
+        text += &format!(", without contact {without:.0} %");
     }
     if let Some(most) = progress.max_env_steps.filter(|_| rate > 0.0) {
         let left_s = most.saturating_sub(steps) as f64 / rate;

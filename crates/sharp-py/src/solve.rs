@@ -118,7 +118,10 @@ impl Settings {
             }
         };
         let mut method = Method::by_name(&self.learning).ok_or_else(|| {
-            Raised::new("USAGE", format!("learning is {:?}, expected fast, prior or paper", self.learning))
+            Raised::new(
+                "USAGE",
+                format!("learning is {:?}, expected fast, prior, paper or paper-success", self.learning),
+            )
         })?;
         if let Some(seconds) = self.failure_cost {
             if !(seconds.is_finite() && seconds >= 0.0) {
