@@ -39,24 +39,30 @@ pub(crate) fn plan_guide(
 
 /// Smoothed ways of one request, by outline and attempt: robots that differ in how they steer share them.
 #[derive(Default)]
-pub(crate) struct Drafts<'a>(Vec<(&'a dyn RobotGeometry, usize, Result<Vec<Point>, NoGuide>)>);
+pub(crate) struct Drafts<'a>(Vec<Draft<'a>>);
+
+struct Draft<'a> {
+    geometry: &'a dyn RobotGeometry,
+    /// The number of the attempt.
+    attempt: usize,
+    way: Result<Vec<Point>, NoGuide>,
+}
 
 impl<'a> Drafts<'a> {
-    /// The draft of attempt `number` for the outline `geometry`, which `make` makes the first time.
+    /// The smoothed way of `attempt` for the outline `geometry`, which `make` makes the first time.
     fn of(
         &mut self,
         geometry: &'a dyn RobotGeometry,
-        number: usize,
+        attempt: usize,
         make: impl FnOnce() -> Result<Vec<Point>, NoGuide>,
     ) -> Result<&[Point], NoGuide> {
-        let is_it = |(of, attempt, _): &(&dyn RobotGeometry, usize, _)| {
-            std::ptr::addr_eq(*of, geometry) && *attempt == number
-        };
+        let is_it =
+            |draft: &Draft<'_>| std::ptr::addr_eq(draft.geometry, geometry) && draft.attempt == attempt;
         let index = self.0.iter().position(is_it).unwrap_or_else(|| {
-            self.0.push((geometry, number, make()));
+            self.0.push(Draft { geometry, attempt, way: make() });
             self.0.len() - 1
         });
-        self.0[index].2.as_deref().map_err(Clone::clone)
+        self.0[index].way.as_deref().map_err(Clone::clone)
     }
 }
 
