@@ -35,8 +35,13 @@ fn assert_flat(promise: &str, count: u64, mut work: impl FnMut(u64)) {
         &format!("{half_mb:.0} MB after half, {mb:.0} MB after all, {files} open files"),
         since,
     );
-    // The allocator keeps what it had at its peak; a leak grows with the number of cases.
-    assert!(mb < half_mb * 1.1 + 16.0, "{promise}: {half_mb} MB after half of {count}, {mb} MB after all");
+    // The allocator keeps what it had at its peak; a leak grows with the number of cases. Without a soak other tests of this
+    // program run meanwhile, and their memory counts as well.
+    let slack_mb = if std::env::var_os("SHARP_SOAK").is_some() { 16.0 } else { 128.0 };
+    assert!(
+        mb < half_mb * 1.1 + slack_mb,
+        "{promise}: {half_mb} MB after half of {count}, {mb} MB after all"
+    );
     assert!(files <= half_files + 2, "{promise}: {half_files} open files after half, {files} after all");
 }
 
