@@ -275,7 +275,7 @@ mod tests {
         assert!(reason.contains("the husky is 0.67 m wide"), "{reason}");
         let (world, query) = rooms(12);
         assert_eq!(obstruction(&world, &query), None, "a door of 1.2 m leaves room");
-        let is_shut = [6, 7, 12].map(|door| rooms(door)).map(|(world, query)| is_shut(&world, &query));
+        let is_shut = [6, 7, 12].map(rooms).map(|(world, query)| is_shut(&world, &query));
         assert_eq!(is_shut, [true, false, false], "doors of 0.6, 0.7 and 1.2 m for a robot of 0.67 m");
     }
 }
