@@ -264,7 +264,7 @@ fn end_piece(
     PlanPiece { until, success, episodes, time_s, runs: count.episodes }
 }
 
-/// Drives a piece of `plan`, a few times only if its price is trusted and none of them fails, or if one in four fails.
+/// Drives a piece of `plan`, a few times only if its price is trusted and none of them fails, or if half of them fail.
 fn drive(
     problem: &PlanningProblem<'_>,
     plan: &[Arc<GuidedOption>],
