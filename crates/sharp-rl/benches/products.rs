@@ -11,12 +11,15 @@
 
 #![allow(clippy::disallowed_methods, reason = "a bench is a command: it reads its arguments and the clock")]
 
+mod updates;
+
 use std::time::Instant;
 
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
-use sharp_rl::{Batch, EnvironmentSpec, GradientBackend, Sac, SacSettings, SacState, Stream};
+use sharp_rl::{EnvironmentSpec, GradientBackend, Stream};
+
+use updates::{Updates, median, rounds};
 
 /// The lengths of an option's vectors in the paper's form.
 const SPEC: EnvironmentSpec = EnvironmentSpec { observation_len: 5, action_len: 2 };
@@ -25,11 +28,7 @@ const ROUNDS: usize = 9;
 const SIDE: usize = 256;
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mut pairs = arguments.windows(2).filter(|pair| pair[0] == "--rounds");
-    let rounds = pairs.next().map_or(ROUNDS, |pair| pair[1].parse().expect("--rounds takes a number"));
-    let is_bench = arguments.iter().any(|argument| argument == "--bench");
-    let (rounds, repeats) = if is_bench { (rounds, 60) } else { (1, 1) };
+    let (rounds, repeats) = rounds(ROUNDS).map_or((1, 1), |rounds| (rounds, 60));
     println!("{:.3} GFLOP in the products of an update", 1e-9 * update_flop());
     println!("| threads | updates/s | GFLOP/s of updates | of plain products | share |");
     println!("|---|---|---|---|---|");
@@ -52,12 +51,6 @@ fn at_once(threads: usize, rate: impl Fn() -> f64 + Sync) -> f64 {
         let running: Vec<_> = (0..threads).map(|_| scope.spawn(&rate)).collect();
         running.into_iter().map(|one| one.join().expect("no panic")).sum()
     })
-}
-
-/// Sorts `values` and returns the middle one.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// Floating-point operations of one product of two square matrices.
@@ -86,17 +79,9 @@ fn update_flop() -> f64 {
 
 /// Updates a second.
 fn update_rate(count: u32) -> f64 {
-    let settings = SacSettings::default();
-    let mut rng = Stream::seed_from_u64(1);
-    let mut state = SacState::new(SPEC, &settings, &mut rng);
-    let mut sac = Sac::new(SPEC, &settings, GradientBackend::Fused);
-    let batches: Vec<Batch> = (0..8).map(|_| random_batch(settings.batch, &mut rng)).collect();
-    sac.update(&mut state, &batches[0]);
-    let begun = Instant::now();
-    for index in 0..count as usize {
-        sac.update(&mut state, &batches[index % batches.len()]);
-    }
-    f64::from(count) / begun.elapsed().as_secs_f64()
+    let mut updates = Updates::new(GradientBackend::Fused, SPEC, (SIDE, SIDE));
+    updates.rate(1);
+    updates.rate(count)
 }
 
 /// Products a second: of two matrices, and with the one or the other transposed, in turn.
@@ -122,20 +107,4 @@ fn product_rate(count: u32) -> f64 {
     let rate = f64::from(count) / begun.elapsed().as_secs_f64();
     assert!(c.iter().all(|value| value.is_finite()), "a product of finite numbers");
     rate
-}
-
-fn random_batch(len: usize, rng: &mut Stream) -> Batch {
-    let mut batch = Batch::new(SPEC, len);
-    for values in [
-        &mut batch.observations,
-        &mut batch.next_observations,
-        &mut batch.rewards,
-        &mut batch.noise,
-        &mut batch.next_noise,
-    ] {
-        values.fill_with(|| rng.sample(StandardNormal));
-    }
-    batch.actions.fill_with(|| rng.random_range(-1.0..1.0));
-    batch.discounts.fill_with(|| if rng.random_bool(0.05) { 0.0 } else { 0.99 });
-    batch
 }
