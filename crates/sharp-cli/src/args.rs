@@ -114,6 +114,18 @@ pub(crate) struct ReadingArgs {
     pub(crate) downsample: u32,
 }
 
+impl ReadingArgs {
+    /// Whether nothing was said of how to read a map.
+    pub(crate) fn is_usual(&self) -> bool {
+        let Self { resolution, unknown, allow_outside, keepout, downsample } = self;
+        resolution.is_none()
+            && *unknown == Unknown::Blocked
+            && !allow_outside
+            && keepout.is_empty()
+            && *downsample == 1
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Unknown {
     Blocked,

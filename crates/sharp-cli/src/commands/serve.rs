@@ -27,6 +27,10 @@ pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
         let message = format!("{} is no plan's folder; a map is served with --library DIR", args.place);
         return Err(Failure::new("USAGE", message));
     }
+    if !args.reading.is_usual() {
+        let message = "a plan has its map; --resolution, --unknown, --keepout, --downsample and --allow-outside go with --library";
+        return Err(Failure::new("USAGE", message.to_owned()));
+    }
     let tour = load_tour(folder)?;
     let plan = &tour.plans[0];
     let mut driver: Option<RemoteDriver> = None;
