@@ -1,7 +1,7 @@
 //! The planning context of one guide: request, robot, settings, and the steps of its planning.
 
 use sharp_motion::{Maneuver, Steering};
-use sharp_space::{CollisionChecker, Heading, Point, Pose, Vector};
+use sharp_space::{CollisionChecker, Heading, Point, Pose, Vector, WidestPaths};
 
 use crate::band::{self, BandSettings, COARSE_M};
 use crate::inflate::GuideRobot;
@@ -124,6 +124,12 @@ impl<'a> GuideContext<'a> {
         let reach_m = self.robot.geometry.footprint().inscribed_radius_m() + 2.0 * frame.resolution_m;
         let first = mask.nearest_open(start, reach_m).ok_or(NoGuide::Start(start))?;
         let last = mask.nearest_open(goal, reach_m).ok_or(NoGuide::Goal(goal))?;
+        let is_shut = |paths: &WidestPaths| {
+            paths.narrowest(first, last).is_none_or(|place| mask.clearance_m(place) < mask.least_m)
+        };
+        if mask.field.made_widest_paths().is_some_and(is_shut) {
+            return Err(NoGuide::Unreachable);
+        }
         let cells = ridge(mask, first, last, weight).ok_or(NoGuide::Unreachable)?;
         let mut points: Vec<Vector> =
             cells.iter().map(|cell| Vector::new(cell.col as f64 + 0.5, cell.row as f64 + 0.5)).collect();

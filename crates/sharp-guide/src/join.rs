@@ -12,6 +12,7 @@ use sharp_options::Endpoint;
 use sharp_rbvd::StateId;
 use sharp_space::{Cell, Heading, Point, Pose};
 
+use crate::gap::narrowest_gap_m;
 use crate::guided_option::GuidedOption;
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
@@ -89,7 +90,12 @@ fn joined(
         option.target.endpoint().map(|set| (set.center, DISC_FACTOR * set.radius_m))
     };
     let discs: Vec<(Point, f64)> = options.iter().filter_map(disc).collect();
-    let (path, cuts) = robot.inflated_at(Some(start)).find_map(|inflated| {
+    // A margin that a door on the way has no room for need not be tried.
+    let inscribed_m = |robot: &GuideRobot<'_>| robot.geometry.footprint().inscribed_radius_m();
+    let widest_m = robot.inflated_at(Some(start)).map(|robot| inscribed_m(&robot)).fold(0.0, f64::max);
+    let gap_m = narrowest_gap_m(robot.geometry.clearance(), &way, widest_m);
+    let mut fitting = robot.inflated_at(Some(start)).filter(|robot| 2.0 * inscribed_m(robot) <= gap_m);
+    let (path, cuts) = fitting.find_map(|inflated| {
         let path = smooth_guide((&way, &discs), &request, &inflated, settings).ok()?;
         cuts(options, &path).map(|cuts| (path, cuts))
     })?;

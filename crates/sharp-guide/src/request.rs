@@ -152,4 +152,13 @@ impl NoGuide {
     pub(crate) const fn is_hopeless(&self) -> bool {
         matches!(self, Self::Start(_) | Self::Goal(_) | Self::Unreachable | Self::LeadIn(_))
     }
+
+    /// Whether a way was found that fails more than `reach_m` from `place`: beginning otherwise at `place` would not help.
+    #[must_use]
+    pub fn is_beyond(&self, place: Point, reach_m: f64) -> bool {
+        match self {
+            Self::Footprint(at) | Self::Bend(at) | Self::Astray(at) => (at - place).norm() > reach_m,
+            _ => false,
+        }
+    }
 }

@@ -8,16 +8,52 @@ use sharp_space::{Cell, GridFrame};
 use crate::traversable::TraversableMask;
 
 /// What is known of a cell during the search.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, Default)]
 enum Mark {
+    /// Nobody looked.
+    #[default]
     Unseen,
     Blocked,
     Open,
     Closed,
 }
 
+/// One cell of the search.
+#[derive(Clone, Copy, Default)]
+struct Node {
+    /// Cost so far, cells; infinite until a way leads here.
+    cost: f32,
+    mark: Mark,
+    /// The step that led here.
+    step: u8,
+}
+
+/// Nodes in squares of so many cells a side, which are made when the search comes there: most searches see little of a large map.
+const TILE: usize = 64;
+
+struct Nodes {
+    tiles: Vec<Option<Box<[Node; TILE * TILE]>>>,
+    tiles_in_row: usize,
+}
+
+impl Nodes {
+    fn new(frame: &GridFrame) -> Self {
+        let tiles_in_row = frame.width.div_ceil(TILE);
+        Self { tiles: vec![None; tiles_in_row * frame.height.div_ceil(TILE)], tiles_in_row }
+    }
+
+    fn at(&mut self, cell: Cell) -> &mut Node {
+        let tile = cell.row / TILE * self.tiles_in_row + cell.col / TILE;
+        let nodes = self.tiles[tile].get_or_insert_with(|| Box::new([Node::default(); TILE * TILE]));
+        &mut nodes[cell.row % TILE * TILE + cell.col % TILE]
+    }
+}
+
 /// Columns and rows of the eight neighbours, sides first; the opposite of `i` is at `i ^ 1`.
 const STEPS: [(isize, isize); 8] = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1)];
+
+/// A search that fails after this share of the map, one cell in so many, took as long as making its widest ways does.
+const MUCH: usize = 16;
 
 /// The cheapest 8-connected way from `start` to `goal`, both ends included, without cutting corners.
 ///
@@ -26,11 +62,17 @@ const STEPS: [(isize, isize); 8] = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-
 pub(crate) fn ridge(mask: &TraversableMask<'_>, start: Cell, goal: Cell, weight: f64) -> Option<Vec<Cell>> {
     let mut search = RidgeSearch::new(mask, goal, weight);
     search.push(start, 1.0, 0);
+    let mut expanded = 0;
     while let Some(cell) = search.pop() {
         if cell == goal {
             return Some(search.trace(start, goal));
         }
         search.expand(cell);
+        expanded += 1;
+    }
+    if expanded > mask.frame().len() / MUCH {
+        // The next search knows beforehand.
+        mask.field.widest_paths();
     }
     None
 }
@@ -40,11 +82,7 @@ struct RidgeSearch<'a> {
     frame: &'a GridFrame,
     goal: Cell,
     weight: f64,
-    marks: Vec<u8>,
-    /// Cost so far in cells plus 1, so that the zeroed pages of an untouched map mean unseen.
-    costs: Vec<f32>,
-    /// The step that led here.
-    steps: Vec<u8>,
+    nodes: Nodes,
     /// Estimated total cost (bits of a positive float, which sort like it) and cell.
     open: BinaryHeap<Reverse<(u32, u32)>>,
 }
@@ -57,54 +95,47 @@ impl<'a> RidgeSearch<'a> {
             frame,
             goal,
             weight,
-            marks: vec![0; frame.len()],
-            costs: vec![0.0; frame.len()],
-            steps: vec![0; frame.len()],
+            nodes: Nodes::new(frame),
             open: BinaryHeap::new(),
         }
     }
 
-    fn mark(&mut self, cell: Cell) -> Mark {
-        let index = self.frame.index(cell);
-        match self.marks[index] {
-            0 => {
-                let open = self.mask.is_open(cell);
-                self.marks[index] = if open { 1 } else { 2 };
-                if open { Mark::Unseen } else { Mark::Blocked }
-            }
-            1 if self.costs[index] > 0.0 => Mark::Open,
-            1 => Mark::Unseen,
-            2 => Mark::Blocked,
-            _ => Mark::Closed,
+    /// The node of `cell`, which is looked at the first time.
+    fn node(&mut self, cell: Cell) -> &mut Node {
+        let (mask, node) = (self.mask, self.nodes.at(cell));
+        if node.mark == Mark::Unseen {
+            node.mark = if mask.is_open(cell) { Mark::Open } else { Mark::Blocked };
+            node.cost = f32::INFINITY;
         }
+        node
     }
 
     fn push(&mut self, cell: Cell, cost: f32, step: usize) {
-        let index = self.frame.index(cell);
-        self.costs[index] = cost;
-        self.steps[index] = step as u8;
+        let node = self.node(cell);
+        (node.cost, node.step) = (cost, step as u8);
         let (dc, dr) = (cell.col.abs_diff(self.goal.col) as f32, cell.row.abs_diff(self.goal.row) as f32);
         let octile = dc.max(dr) + (std::f32::consts::SQRT_2 - 1.0) * dc.min(dr);
-        self.open.push(Reverse(((cost + octile).to_bits(), index as u32)));
+        self.open.push(Reverse(((cost + octile).to_bits(), self.frame.index(cell) as u32)));
     }
 
     fn pop(&mut self) -> Option<Cell> {
         while let Some(Reverse((_, index))) = self.open.pop() {
-            let index = index as usize;
-            if self.marks[index] != 3 {
-                self.marks[index] = 3;
-                return Some(self.frame.cell(index));
+            let cell = self.frame.cell(index as usize);
+            let node = self.nodes.at(cell);
+            if node.mark != Mark::Closed {
+                node.mark = Mark::Closed;
+                return Some(cell);
             }
         }
         None
     }
 
     fn expand(&mut self, cell: Cell) {
-        let so_far = self.costs[self.frame.index(cell)];
+        let so_far = self.nodes.at(cell).cost;
         let mut side_open = [false; 4];
         for (number, &step) in STEPS.iter().enumerate() {
             let Some(next) = offset(self.frame, cell, step) else { continue };
-            let mark = self.mark(next);
+            let Node { mark, cost: before, .. } = *self.node(next);
             if number < 4 {
                 side_open[number] = mark != Mark::Blocked;
             } else if !diagonal_is_clear(step, side_open) {
@@ -115,7 +146,7 @@ impl<'a> RidgeSearch<'a> {
             }
             let length = if number < 4 { 1.0 } else { std::f32::consts::SQRT_2 };
             let cost = so_far + length * self.price(next);
-            if mark == Mark::Unseen || cost < self.costs[self.frame.index(next)] {
+            if cost < before {
                 self.push(next, cost, number);
             }
         }
@@ -127,11 +158,11 @@ impl<'a> RidgeSearch<'a> {
         (1.0 + self.weight * lack * lack) as f32
     }
 
-    fn trace(&self, start: Cell, goal: Cell) -> Vec<Cell> {
+    fn trace(&mut self, start: Cell, goal: Cell) -> Vec<Cell> {
         let mut cells = vec![goal];
         let mut cell = goal;
         while cell != start {
-            let back = STEPS[usize::from(self.steps[self.frame.index(cell)]) ^ 1];
+            let back = STEPS[usize::from(self.nodes.at(cell).step) ^ 1];
             cell = offset(self.frame, cell, back).expect("the search came from inside the grid");
             cells.push(cell);
         }

@@ -36,11 +36,12 @@ pub fn routes<'a>(
 }
 
 /// The same without the search by hybrid A*, arriving in the direction of `heading` where there is room: quick, and blind in places where a way must be found by manoeuvring.
+/// Where there is none for a margin that was tried it says why.
 pub fn ridge_routes<'a>(
     robot: &GuideRobot<'a>,
     start: Pose,
     (goal, heading): (Point, Option<Heading>),
-) -> impl Iterator<Item = GuidePath> + use<'a> {
+) -> impl Iterator<Item = Result<GuidePath, NoGuide>> + use<'a> {
     let without_margin = GuideRobot::new(robot.geometry, robot.steering);
     let (is_hopeless, mut drafts) = (OnceCell::new(), Drafts::default());
     robot.inflated_at(Some(start)).filter_map(move |robot| {
@@ -54,7 +55,7 @@ pub fn ridge_routes<'a>(
                 bare.is_err_and(|reason| reason.is_hopeless())
             });
         }
-        found.ok()
+        Some(found)
     })
 }
 

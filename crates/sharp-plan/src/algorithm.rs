@@ -19,7 +19,7 @@ use crate::odds::{ComposedOdds, refine};
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Phase;
-use crate::reason::{is_joined, is_shut, obstruction, unturned};
+use crate::reason::{Gap, fits, is_joined, narrowest_gap, obstruction, unturned};
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
 use crate::verify::{PlannedOption, Solution, composed, predict, verify};
@@ -74,15 +74,18 @@ pub(crate) fn solve_with(
     library: &mut OptionLibrary,
     known: &Arc<KnownOptions>,
 ) -> Result<Outcome, FileError> {
-    let outcome = algorithm_1(problem, abstraction, library, known);
-    let patient = problem.method.patient();
-    let outcome = match (outcome, &patient) {
+    let mut outcome = algorithm_1(problem, abstraction, library, known);
+    if let Ok(Outcome::NoPlan(_)) = outcome {
+        let gap = narrowest_gap(problem.world, &problem.query);
         // What quick guides cannot reach may be reached by manoeuvring, unless the robot does not fit.
-        (Ok(Outcome::NoPlan(_)), Some(method)) if !is_shut(problem.world, &problem.query) => {
-            algorithm_1(&PlanningProblem { method, ..*problem }, abstraction, library, known)
+        if let Some(method) = problem.method.patient().filter(|_| fits(problem.world, gap.as_ref())) {
+            let patient = PlanningProblem { method: &method, ..*problem };
+            outcome = algorithm_1(&patient, abstraction, library, known);
         }
-        (outcome, _) => outcome,
-    };
+        if let Ok(Outcome::NoPlan(reason)) = &mut outcome {
+            *reason = describe(problem, gap.as_ref(), reason);
+        }
+    }
     library.end_problem(matches!(outcome, Ok(Outcome::Solved(_) | Outcome::NoPlan(_))));
     problem.monitor.phase(Phase::Done);
     outcome
@@ -104,7 +107,7 @@ fn algorithm_1(
             let is_hurried = method.verify_episodes == 0;
             search.with_known(Arc::clone(known)).with_trials(conditions, is_hurried)
         }
-        Err(unplaced) => return Ok(Outcome::NoPlan(describe(problem, &unplaced.to_string()))),
+        Err(unplaced) => return Ok(Outcome::NoPlan(unplaced.to_string())),
     };
     let mut policies = Policies::new(library);
     let mut most = if method.verify_episodes == 0 { COMPOSED_MAX } else { VERIFIED_MAX };
@@ -176,7 +179,7 @@ fn algorithm_1(
     let keeps_all = method.usable_success == 0.0;
     Ok(match best.filter(|solution| keeps_all || solution.predicted.rate() >= LEAST_SUCCESS) {
         Some(solution) => Outcome::Solved(Box::new(solution)),
-        None => Outcome::NoPlan(describe(problem, &describe_search(&search))),
+        None => Outcome::NoPlan(describe_search(&search)),
     })
 }
 
@@ -254,10 +257,10 @@ fn charge_hand_overs(search: &mut Search<'_>, steps: &[PlannedOption], failure_c
 }
 
 /// Why there is no plan: what the map says, where that is enough, else what the search knows.
-fn describe(problem: &PlanningProblem<'_>, known: &str) -> String {
+fn describe(problem: &PlanningProblem<'_>, gap: Option<&Gap>, known: &str) -> String {
     let PlanningProblem { world, query, method, .. } = problem;
     let asks_heading = method.search.goal_heading_tolerance_rad.is_some();
-    let found = obstruction(world, query).or_else(|| unturned(world, query, asks_heading));
+    let found = obstruction(world, query, gap).or_else(|| unturned(world, query, asks_heading));
     found.unwrap_or_else(|| known.to_owned())
 }
 

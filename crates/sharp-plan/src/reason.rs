@@ -5,11 +5,11 @@ use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 use sharp_drive::World;
-use sharp_guide::ridge_routes;
-use sharp_space::{Cell, GridFrame, Heading, Occupancy, Point, Pose, trig};
+use sharp_guide::{NoGuide, gap_m, ridge_routes};
+use sharp_space::{Cell, GridFrame, Heading, Occupancy, Point, Pose};
 
 use crate::query::Query;
-use crate::search::goal_of;
+use crate::search::{DEPARTURE_REACH_M, goal_of};
 
 /// Room beside the outline below which a way counts as narrow for a robot under noise, metres.
 const NARROW_M: f64 = 0.1;
@@ -20,14 +20,14 @@ const DIRECTIONS: u32 = 24;
 
 /// What the map itself says: that no free way joins start and goal, or that even the widest is narrow for the robot.
 /// `None` where the map leaves room.
-pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
+pub(crate) fn obstruction(world: &World, query: &Query, gap: Option<&Gap>) -> Option<String> {
     let frame = world.grid.frame();
     for (end, pose) in [("start", query.start), ("goal", query.goal)] {
         if frame.cell_at(pose.position).is_none() {
             return Some(format!("the {end} lies outside the map"));
         }
     }
-    let Some(place) = narrowest_place(world, query) else {
+    let Some(Gap { place, width_m }) = gap else {
         let separate = "start and goal lie in separate parts of the free space: no free way joins them";
         return Some(if is_joined_by_unknown(world, query) {
             format!("{separate}, only unknown space does (--unknown free takes it as free)")
@@ -36,8 +36,7 @@ pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
         });
     };
     let robot_m = 2.0 * world.robot.footprint.inscribed_radius_m();
-    let width_m = width_at(world, place);
-    (width_m < robot_m + 2.0 * NARROW_M).then(|| {
+    (*width_m < robot_m + 2.0 * NARROW_M).then(|| {
         format!(
             "the widest way from start to goal is {width_m:.2} m wide at its narrowest place, near ({:.2}, {:.2}), and the \
              {} is {robot_m:.2} m wide",
@@ -46,10 +45,23 @@ pub(crate) fn obstruction(world: &World, query: &Query) -> Option<String> {
     })
 }
 
-/// Whether the robot fits through no way from start to goal, whatever it does.
-pub(crate) fn is_shut(world: &World, query: &Query) -> bool {
-    let robot_m = 2.0 * world.robot.footprint.inscribed_radius_m();
-    narrowest_place(world, query).is_none_or(|place| width_at(world, place) < robot_m)
+/// A narrow place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gap {
+    place: Point,
+    /// The free length of the shortest straight line through it, metres.
+    width_m: f64,
+}
+
+/// The narrowest place of the widest way from start to goal; `None` if no free way joins them.
+pub(crate) fn narrowest_gap(world: &World, query: &Query) -> Option<Gap> {
+    let place = is_joined(world, query).then(|| narrowest_place(world, query)).flatten()?;
+    Some(Gap { place, width_m: width_at(world, place) })
+}
+
+/// Whether the robot fits through the narrowest place on its way, which `gap` is; false where there is no way.
+pub(crate) fn fits(world: &World, gap: Option<&Gap>) -> bool {
+    gap.is_some_and(|gap| gap.width_m >= 2.0 * world.robot.footprint.inscribed_radius_m())
 }
 
 /// Whether the headings are what is in the way: the robot finds no manoeuvre from its heading at the start, though a robot that
@@ -58,9 +70,20 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
     let robot = world.guide_robot();
     let goal = goal_of(query.goal, world, None);
     let end = goal.easiest_end(world.geometry.clearance(), world.robot.footprint.inscribed_radius_m());
-    let leads_on = |start: Pose| ridge_routes(&robot, start, (end, None)).next().is_some();
     let model = &world.robot;
-    if goal.contains(query.start.position) || leads_on(query.start) {
+    let leads_on = |start: Pose| {
+        let mut found = Err(NoGuide::Unreachable);
+        ridge_routes(&robot, start, (end, None)).any(|route| {
+            found = route.map(|_| ());
+            found.is_ok()
+        });
+        found
+    };
+    let as_it_looks = leads_on(query.start);
+    if as_it_looks.as_ref().is_err_and(|why| why.is_beyond(query.start.position, DEPARTURE_REACH_M)) {
+        return None;
+    }
+    if goal.contains(query.start.position) || as_it_looks.is_ok() {
         return asks_heading.then(|| {
             "the goal can be reached, but no way was found that arrives in the heading that is asked for"
                 .to_owned()
@@ -73,7 +96,7 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
     if !(1..HEADINGS)
         .into_par_iter()
         .map(turned)
-        .any(|start| world.geometry.is_free(start) && leads_on(start))
+        .any(|start| world.geometry.is_free(start) && leads_on(start).is_ok())
     {
         return None;
     }
@@ -96,7 +119,9 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
 
 /// Returns true if some free way joins start and goal, however narrow.
 pub(crate) fn is_joined(world: &World, query: &Query) -> bool {
-    narrowest_place(world, query).is_some()
+    let (frame, field) = (world.grid.frame(), world.geometry.clearance());
+    let ends = (frame.cell_at(query.start.position), frame.cell_at(query.goal.position));
+    matches!(ends, (Some(start), Some(goal)) if field.widest_paths().narrowest(start, goal).is_some())
 }
 
 /// Returns true if start and goal are joined where unknown space counts as free.
@@ -191,22 +216,8 @@ fn narrowest_place(world: &World, query: &Query) -> Option<Point> {
 
 /// The free length of the shortest straight line through `place`, metres.
 pub(crate) fn width_at(world: &World, place: Point) -> f64 {
-    let frame = world.grid.frame();
-    let step_m = 0.05 * frame.resolution_m;
-    let is_free =
-        |point: Point| frame.cell_at(point).is_some_and(|cell| world.grid.get(cell) == Occupancy::Free);
-    let free_m = |angle_rad: f64| {
-        let (sin, cos) = (trig::sin(angle_rad), trig::cos(angle_rad));
-        let along = |distance_m: f64| Point::new(place.x + distance_m * cos, place.y + distance_m * sin);
-        // The edge lies somewhere in the step after the last free one.
-        let free = (1..).map(|i| f64::from(i) * step_m).take_while(|&at_m| is_free(along(at_m))).last();
-        free.unwrap_or(0.0) + 0.5 * step_m
-    };
-    let width = |direction: u32| {
-        let angle_rad = std::f64::consts::PI * f64::from(direction) / f64::from(DIRECTIONS);
-        free_m(angle_rad) + free_m(angle_rad + std::f64::consts::PI)
-    };
-    (0..DIRECTIONS).map(width).fold(f64::INFINITY, f64::min)
+    let direction = |i: u32| std::f64::consts::PI * f64::from(i) / f64::from(DIRECTIONS);
+    gap_m(world.geometry.clearance(), place, (0..DIRECTIONS).map(direction))
 }
 
 #[cfg(test)]
@@ -232,9 +243,9 @@ mod tests {
     #[test]
     fn rooms_without_a_door_are_separate() {
         let (world, query) = rooms(0);
-        let reason = obstruction(&world, &query).expect("no way");
+        let reason = obstruction(&world, &query, None).expect("no way");
         assert!(reason.contains("separate parts"), "{reason}");
-        assert!(is_shut(&world, &query), "nothing leads through");
+        assert!(narrowest_gap(&world, &query).is_none(), "nothing leads through");
     }
 
     #[test]
@@ -263,19 +274,20 @@ mod tests {
         let rows: Vec<String> = (0..32).map(row).collect();
         let grid = OccupancyGrid::from_ascii(0.1, &rows.join("\n")).expect("a sound drawing");
         let (_, query) = rooms(0);
-        let reason = obstruction(&World::new(grid, RobotModel::husky()), &query).expect("no way");
+        let reason = obstruction(&World::new(grid, RobotModel::husky()), &query, None).expect("no way");
         assert!(reason.contains("only unknown space does"), "{reason}");
     }
 
     #[test]
     fn a_narrow_door_is_measured() {
-        let (world, query) = rooms(7);
-        let reason = obstruction(&world, &query).expect("a narrow way");
+        let obstruction =
+            |(world, query): &(World, Query)| obstruction(world, query, narrowest_gap(world, query).as_ref());
+        let reason = obstruction(&rooms(7)).expect("a narrow way");
         assert!(reason.contains("is 0.70 m wide at its narrowest place, near (3.0"), "{reason}");
         assert!(reason.contains("the husky is 0.67 m wide"), "{reason}");
-        let (world, query) = rooms(12);
-        assert_eq!(obstruction(&world, &query), None, "a door of 1.2 m leaves room");
-        let is_shut = [6, 7, 12].map(rooms).map(|(world, query)| is_shut(&world, &query));
-        assert_eq!(is_shut, [true, false, false], "doors of 0.6, 0.7 and 1.2 m for a robot of 0.67 m");
+        assert_eq!(obstruction(&rooms(12)), None, "a door of 1.2 m leaves room");
+        let fits = |(world, query)| fits(&world, narrowest_gap(&world, &query).as_ref());
+        let found = [6, 7, 12].map(rooms).map(fits);
+        assert_eq!(found, [false, true, true], "doors of 0.6, 0.7 and 1.2 m for a robot of 0.67 m");
     }
 }

@@ -45,6 +45,8 @@ const TRIAL_EPISODES: [u32; 2] = [200, 32];
 const TRIAL_M: f64 = 2.5;
 /// Ways out of a tight start that are tried side by side where an answer is wanted at once.
 const WAYS_AT_ONCE: usize = 2;
+/// What is in the way further from the start than this cannot be helped by leaving it otherwise, metres.
+pub(crate) const DEPARTURE_REACH_M: f64 = 4.0;
 /// A leg from the start that succeeds less often than this, by its price and then when tried, looks for a better way to
 /// begin.
 const LEAVES_WELL: f64 = 0.98;
@@ -361,7 +363,9 @@ impl<'a> Search<'a> {
         let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
         let is_tight = *self.is_tight.get_or_init(|| is_tight(&self.world.guide_robot(), self.query.start));
         let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
-        let is_settled = chosen.is_some() && (at_once.is_ok() || id == LegId::Direct);
+        let start = self.query.start.position;
+        let is_beyond = at_once.as_ref().is_err_and(|reason| reason.is_beyond(start, DEPARTURE_REACH_M));
+        let is_settled = is_beyond || (chosen.is_some() && (at_once.is_ok() || id == LegId::Direct));
         if !self.settings.departures || is_settled || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
         }
@@ -494,7 +498,7 @@ impl<'a> Search<'a> {
         if candidate.id() == LegId::Direct && self.settings.direct {
             let at_once = start == self.query.start;
             let expansions = if at_once { EXPANSIONS } else { EXPANSIONS_DEPARTING };
-            return self.direct_route(start, candidate.option.end, expansions).ok_or(NoGuide::Unreachable);
+            return self.direct_route(start, candidate.option.end, expansions);
         }
         let (start, heading) = (start.position, Some(start.heading));
         self.plan_guide(&UnguidedOption { start, heading, ..candidate.option })
@@ -509,16 +513,21 @@ impl<'a> Search<'a> {
     }
 
     /// The cheapest of the routes to `end` with different safety margins, by their prices.
-    fn direct_route(&self, start: Pose, end: Point, expansions: usize) -> Option<GuidePath> {
+    fn direct_route(&self, start: Pose, end: Point, expansions: usize) -> Result<GuidePath, NoGuide> {
         let robot = self.world.guide_robot();
         let price_s =
             |guide: &GuidePath| self.pricer.cost_s(&self.pricer.of_guide(LegId::Direct, guide, None), None);
         let heading = self.goal.heading.map(|(heading, _)| heading);
-        let routes_in = ridge_routes(&robot, start, (end, heading)).take(self.settings.direct_routes);
-        let cheapest = routes_in.min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
+        let mut reason = NoGuide::Unreachable;
+        let found = ridge_routes(&robot, start, (end, heading));
+        let found = found.filter_map(|route| route.map_err(|why| reason = why).ok());
+        let cheapest = found
+            .take(self.settings.direct_routes)
+            .min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
         let is_patient = self.settings.direct_routes > 1;
         let goal = (end, 0.5 * self.goal.radius_m);
-        cheapest.or_else(|| if is_patient { routes(&robot, start, goal, expansions).next() } else { None })
+        let patient = || if is_patient { routes(&robot, start, goal, expansions).next() } else { None };
+        cheapest.or_else(patient).ok_or(reason)
     }
 
     fn guided(&self, candidate: &Candidate, guide: GuidePath) -> GuidedOption {

@@ -4,8 +4,11 @@
 //! Functions", 2012): linear in the number of cells, exact between cell centres. Every cell outside the grid
 //! counts as blocked, because a robot may not leave the map.
 
+use std::sync::OnceLock;
+
 use crate::grid::{Cell, GridFrame, OccupancyGrid};
 use crate::pose::Point;
+use crate::widest_paths::WidestPaths;
 
 /// For each cell, the distance from its centre to the centre of the nearest blocked cell.
 #[derive(Clone, Debug)]
@@ -13,6 +16,8 @@ pub struct DistanceField {
     frame: GridFrame,
     /// Metres, row-major.
     distances: Vec<f32>,
+    /// Made when they are first asked for.
+    widest_paths: OnceLock<WidestPaths>,
 }
 
 impl DistanceField {
@@ -49,7 +54,7 @@ impl DistanceField {
         for distance in &mut squared {
             *distance = distance.sqrt() * resolution;
         }
-        Self { frame, distances: squared }
+        Self { frame, distances: squared, widest_paths: OnceLock::new() }
     }
 
     /// The frame of the grid it was made from.
@@ -67,6 +72,17 @@ impl DistanceField {
     #[must_use]
     pub fn at(&self, cell: Cell) -> f64 {
         f64::from(self.distances[self.frame.index(cell)])
+    }
+
+    /// The widest ways between cells, made when they are first asked for.
+    pub fn widest_paths(&self) -> &WidestPaths {
+        self.widest_paths.get_or_init(|| WidestPaths::new(self))
+    }
+
+    /// The same if somebody asked for them before.
+    #[must_use]
+    pub fn made_widest_paths(&self) -> Option<&WidestPaths> {
+        self.widest_paths.get()
     }
 
     /// Bilinear interpolation at `point`, metres; 0 outside the grid.

@@ -27,6 +27,7 @@ mod grid;
 mod pose;
 mod region;
 mod seed;
+mod widest_paths;
 
 pub mod conformance;
 pub mod trig;
@@ -41,3 +42,4 @@ pub use grid::{Cell, GridError, GridFrame, Occupancy, OccupancyGrid};
 pub use pose::{Heading, Point, Pose, PoseFrame, Vector, wrap_angle};
 pub use region::{Region, RegionId};
 pub use seed::{Seed, Stream};
+pub use widest_paths::WidestPaths;
