@@ -199,7 +199,14 @@ fn compare(
             let alone = SolveSettings { method: Method::fast(), ..settings.clone() };
             let (mut sharp, _) = place.open(&alone, None)?;
             if let Answer::Solved(other) = sharp.solve(plan.solution.query, &())? {
+                let legs = other.solution.steps.len();
                 let (count, other_s) = executed(&Arc::new(*other), Seed(seed).child("plan", index as u64));
+                if std::env::var_os("SLOW").is_some() {
+                    let (rate, ours) = (count.rate(), plan.solution.steps.len());
+                    println!(
+                        "question {index}: {measured:.3} in {time_s:.1} s by {ours} legs, without the library {rate:.3} in {other_s:.1} s by {legs}"
+                    );
+                }
                 cold = [cold[0] + count.rate(), cold[1] + (time_s / other_s).ln(), cold[2] + 1.0];
             }
         }

@@ -75,7 +75,8 @@ mod tests {
             ########",
         );
         let field = DistanceField::new(&grid.unwrap());
-        let lines = |count: u32| (0..count).map(move |i| std::f64::consts::PI * f64::from(i) / f64::from(count));
+        let lines =
+            |count: u32| (0..count).map(move |i| std::f64::consts::PI * f64::from(i) / f64::from(count));
         let door_m = gap_m(&field, Point::new(1.0, 1.125), lines(24));
         assert!((door_m - 0.75).abs() < 0.02, "the door has 0.75 m, not {door_m}");
         let corner_m = gap_m(&field, Point::new(0.3, 0.3), lines(24));

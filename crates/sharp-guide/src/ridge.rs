@@ -90,14 +90,7 @@ struct RidgeSearch<'a> {
 impl<'a> RidgeSearch<'a> {
     fn new(mask: &'a TraversableMask<'a>, goal: Cell, weight: f64) -> Self {
         let frame = mask.frame();
-        Self {
-            mask,
-            frame,
-            goal,
-            weight,
-            nodes: Nodes::new(frame),
-            open: BinaryHeap::new(),
-        }
+        Self { mask, frame, goal, weight, nodes: Nodes::new(frame), open: BinaryHeap::new() }
     }
 
     /// The node of `cell`, which is looked at the first time.

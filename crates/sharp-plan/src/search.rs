@@ -521,9 +521,8 @@ impl<'a> Search<'a> {
         let mut reason = NoGuide::Unreachable;
         let found = ridge_routes(&robot, start, (end, heading));
         let found = found.filter_map(|route| route.map_err(|why| reason = why).ok());
-        let cheapest = found
-            .take(self.settings.direct_routes)
-            .min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
+        let cheapest =
+            found.take(self.settings.direct_routes).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
         let is_patient = self.settings.direct_routes > 1;
         let goal = (end, 0.5 * self.goal.radius_m);
         let patient = || if is_patient { routes(&robot, start, goal, expansions).next() } else { None };
