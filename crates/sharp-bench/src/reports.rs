@@ -199,6 +199,9 @@ pub struct Predicted {
     /// 98 % of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub with_recovery: Option<Verified>,
+    /// Runs in which the robot may touch walls, which is no failure in the paper; only for methods that learn so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with_contact: Option<Verified>,
 }
 
 impl Predicted {
@@ -215,6 +218,7 @@ impl Predicted {
             lower95,
             sim_time_s: *predicted_time_s,
             with_recovery: None,
+            with_contact: None,
         }
     }
 }

@@ -110,7 +110,9 @@ pub fn solve(
     let (mut report, plan) = answered(report, answer);
     if let (Some(predicted), Some(plan)) = (&mut report.predicted, &plan) {
         monitor.phase(Phase::Verify);
-        predicted.with_recovery = with_recovery(&Arc::new(plan.clone()).into(), settings);
+        let tour = Arc::new(plan.clone()).into();
+        predicted.with_recovery = with_recovery(&tour, settings);
+        predicted.with_contact = with_contact(&tour, settings);
     }
     if report.status == TIMEOUT {
         report.trainings = monitor.trainings();
@@ -132,6 +134,18 @@ pub(crate) fn with_recovery(tour: &Tour, settings: &SolveSettings) -> Option<Ver
     let mut runs = tour.run_settings(RECOVERY_RUNS, first.seed.child("with recovery", 0));
     runs.simulator = first.world.simulator(settings.simulator);
     Some(success(&tour.run(&runs, &|| 0.0)).into())
+}
+
+/// How often `tour` arrives where the robot may touch walls; `None` for methods that do not learn so.
+fn with_contact(tour: &Tour, settings: &SolveSettings) -> Option<Verified> {
+    let is_papers = settings.method.usable_success == 0.0;
+    is_papers.then(|| {
+        let first = &tour.plans[0];
+        let mut runs = tour.run_settings(RECOVERY_RUNS, first.seed.child("with contact", 0));
+        runs.simulator = first.world.simulator(settings.simulator);
+        (runs.contact_ends, runs.recovery) = (false, false);
+        success(&tour.run(&runs, &|| 0.0)).into()
+    })
 }
 
 /// A robot in `world` with the abstraction that `request` asks for: from the folder `cache` if that has it, else made

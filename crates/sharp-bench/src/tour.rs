@@ -102,6 +102,7 @@ fn whole(solved: &[Solved], last: &Solved, goals: &[Pose], tour: Option<&Tour>) 
             lower95: tour.predicted.lower95(),
             sim_time_s: tour.predicted_time_s,
             with_recovery: None,
+            with_contact: None,
         }),
         ..last.report.clone()
     }

@@ -78,13 +78,15 @@ pub struct MonteCarlo<'a> {
     noise: &'a NoiseModel,
     episodes: u32,
     seed: Seed,
+    /// Whether touching an obstacle is a failure.
+    contact_ends: bool,
 }
 
 impl<'a> MonteCarlo<'a> {
-    /// No episodes yet, in forks of `simulator` under `noise`.
+    /// No episodes yet, in forks of `simulator` under `noise`; contact counts as failure.
     #[must_use]
     pub const fn new(world: &'a World, simulator: &'a dyn Simulator, noise: &'a NoiseModel) -> Self {
-        Self { world, simulator, noise, episodes: 0, seed: Seed(0) }
+        Self { world, simulator, noise, episodes: 0, seed: Seed(0), contact_ends: true }
     }
 
     /// The same with so many episodes.
@@ -97,6 +99,12 @@ impl<'a> MonteCarlo<'a> {
     #[must_use]
     pub const fn with_seed(self, seed: Seed) -> Self {
         Self { seed, ..self }
+    }
+
+    /// The same with contact as a failure, or not: then the robot bumps and goes on, as in the paper.
+    #[must_use]
+    pub const fn with_contact_ends(self, contact_ends: bool) -> Self {
+        Self { contact_ends, ..self }
     }
 
     /// Runs `drivers` one after the other from `states`; a success is to finish the last one.
@@ -189,7 +197,8 @@ impl<'a> MonteCarlo<'a> {
         run: impl Fn(&mut Chain, &mut Episode, u64) -> T + Sync,
     ) -> Vec<T> {
         let vehicle = self.world.vehicle(self.simulator, self.noise, true);
-        let (chain, episode) = (Chain::new(drivers), Episode::new(vehicle, EpisodeRules::default()));
+        let rules = EpisodeRules::default().with_contact_ends(self.contact_ends);
+        let (chain, episode) = (Chain::new(drivers), Episode::new(vehicle, rules));
         episodes
             .into_par_iter()
             .with_min_len(4)

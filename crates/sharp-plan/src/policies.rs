@@ -83,7 +83,9 @@ impl<'a> Policies<'a> {
         if self.get(option.id).is_none() {
             self.fresh.insert(option.id);
         }
-        if let (LegId::Option(id), true) = (option.id, learnt.estimate.count.successes > 0) {
+        // Training again would come to the same network, however it does.
+        let is_worth_keeping = learnt.estimate.count.successes > 0 || learnt.training.is_some();
+        if let (LegId::Option(id), true) = (option.id, is_worth_keeping) {
             let corridor = corridor(option, grid);
             let stored = StoredOption { guide: option.guide.clone(), learnt: learnt.clone(), corridor };
             self.library.insert(id, stored)?;

@@ -246,6 +246,13 @@ fn print_report(report: &SolveReport) {
             report.reuse.reused,
             report.reuse.uses
         );
+        if let Some(bumped) = &predicted.with_contact {
+            say!(
+                "where it may touch walls (run --collisions contact), {} of {} runs arrive",
+                bumped.successes,
+                bumped.episodes
+            );
+        }
         if let Some(recovered) = &predicted.with_recovery {
             say!(
                 "where the robot may plan anew on the way, {} of {} runs arrive",
