@@ -166,6 +166,7 @@ fn compare(
     let (mut close, mut bounded, mut above, mut timed) = (0, 0, 0, 0);
     let (mut alike, mut alike_bounded) = (0, 0);
     let (mut error, mut sums, mut cold) = (0.0, [0.0; 4], [0.0; 3]);
+    let tells_each = std::env::var_os("SLOW").is_some();
     for (index, plan) in plans.iter().enumerate() {
         let odds = plan.solution.composed.clone().expect("nothing was run");
         let plan = Arc::new((**plan).clone());
@@ -176,6 +177,10 @@ fn compare(
         bounded += usize::from(odds.lower95 <= count.upper95() && count.lower95() <= odds.upper95);
         above += usize::from(count.upper95() >= odds.lower95);
         timed += usize::from((odds.time_s / time_s - 1.0).abs() <= 0.05);
+        if tells_each {
+            let legs = plan.solution.steps.len();
+            println!("question {index}: {measured:.3} ({:.3}) in {time_s:.1} s by {legs} legs", odds.success);
+        }
         let same = driven_as_learnt(&plan, Seed(seed).child("same", index as u64));
         alike += usize::from((odds.success - same.rate()).abs() <= 0.03);
         alike_bounded += usize::from(odds.lower95 <= same.upper95() && same.lower95() <= odds.upper95);
@@ -201,11 +206,8 @@ fn compare(
             if let Answer::Solved(other) = sharp.solve(plan.solution.query, &())? {
                 let legs = other.solution.steps.len();
                 let (count, other_s) = executed(&Arc::new(*other), Seed(seed).child("plan", index as u64));
-                if std::env::var_os("SLOW").is_some() {
-                    let (rate, ours) = (count.rate(), plan.solution.steps.len());
-                    println!(
-                        "question {index}: {measured:.3} in {time_s:.1} s by {ours} legs, without the library {rate:.3} in {other_s:.1} s by {legs}"
-                    );
+                if tells_each {
+                    println!("  without the library {:.3} in {other_s:.1} s by {legs} legs", count.rate());
                 }
                 cold = [cold[0] + count.rate(), cold[1] + (time_s / other_s).ln(), cold[2] + 1.0];
             }

@@ -41,6 +41,8 @@ const EXPANSIONS: usize = 100_000;
 const EXPANSIONS_DEPARTING: usize = 5_000;
 /// Episodes in which each way out of a tight start is tried; the second where an answer is wanted at once.
 const TRIAL_EPISODES: [u32; 2] = [200, 32];
+/// There, episodes of a way that failed once.
+const DOUBTFUL_EPISODES: u32 = 128;
 /// There, metres of a leg that are driven after the robot has left.
 const TRIAL_M: f64 = 2.5;
 /// Ways out of a tight start that are tried side by side where an answer is wanted at once.
@@ -382,9 +384,8 @@ impl<'a> Search<'a> {
         cheapest.map_or_else(|| at_once.map(Arc::new), |tried| Ok(tried.option))
     }
 
-    /// The leg `candidate` with the first way out of the start that leaves it every time, driving `at_once` before all
-    /// others; the cheapest if each fails at times. After one that never fails the next legs from the start leave it
-    /// likewise.
+    /// The leg `candidate` with the first way out of the start that hardly ever fails, driving `at_once` before all others;
+    /// the cheapest if each fails at times. After one that does well the next legs from the start leave it likewise.
     fn first_that_leaves(
         &self,
         candidate: &Candidate,
@@ -395,7 +396,12 @@ impl<'a> Search<'a> {
                 None => at_once.as_ref().ok().cloned(),
                 Some(number) => self.departing(candidate, &self.departures()[number]),
             };
-            option.map(|option| (self.tried(option), number))
+            let tried = self.tried(option?);
+            // One failure may be chance, and the next way is slower.
+            let is_doubtful =
+                (1.0 - tried.success) * f64::from(TRIAL_EPISODES[1]) < 1.5 && tried.success < 1.0;
+            let tried = if is_doubtful { self.tried_in(tried.option, DOUBTFUL_EPISODES) } else { tried };
+            Some((tried, number))
         };
         let all: Vec<Option<usize>> = (0..self.departures().len()).map(Some).collect();
         let mut best: Option<(TriedLeg, Option<usize>)> = None;
@@ -404,7 +410,7 @@ impl<'a> Search<'a> {
             |ways: &[Option<usize>]| -> Vec<_> { ways.par_iter().map(|&way| trying(way)).collect() };
         let ways = std::iter::once(&[None][..]).chain(all.chunks(WAYS_AT_ONCE));
         for (tried, number) in ways.flat_map(side_by_side).flatten() {
-            is_settled = tried.success >= 1.0;
+            is_settled = tried.success >= LEAVES_WELL;
             if is_settled || best.as_ref().is_none_or(|(best, _)| tried.cost_s < best.cost_s) {
                 best = Some((tried, number));
             }
@@ -421,7 +427,11 @@ impl<'a> Search<'a> {
     /// How the leg `option` does from the start: by a few episodes where there is a simulator, for a price knows little of
     /// tight places. The prior drives, and where it fails too often the follower as well, unless an answer is wanted at once.
     fn tried(&self, option: GuidedOption) -> TriedLeg {
-        let option = Arc::new(option);
+        self.tried_in(Arc::new(option), TRIAL_EPISODES[usize::from(self.is_hurried)])
+    }
+
+    /// The same in so many episodes.
+    fn tried_in(&self, option: Arc<GuidedOption>, episodes: u32) -> TriedLeg {
         let price = self.pricer.price(&option, None);
         let cost_s = |measured: Option<&SuccessEstimate>| self.pricer.cost_s(&price, measured);
         let Some(conditions) = self.trials else {
@@ -429,7 +439,6 @@ impl<'a> Search<'a> {
         };
         let states = InitialStates::exactly(RobotState::at_rest(self.query.start));
         let seed = self.seed.child(&format!("leave {}", option.id), 0);
-        let episodes = TRIAL_EPISODES[usize::from(self.is_hurried)];
         let trial = conditions.monte_carlo(self.world).with_episodes(episodes).with_seed(seed);
         let estimate = |policy| {
             let mut driver = Driver::new(&option, policy, None);
