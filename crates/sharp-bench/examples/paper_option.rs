@@ -13,6 +13,7 @@
 //! * `simulator=kinematic`: where it is learnt; rapier2d otherwise.
 //! * `contact=-10`: added to the reward of each step with a contact.
 //! * `ends=true`: a contact ends the episode.
+//! * `still=10`: an episode in which the robot has moved less than 0.1 m in so many actions is out of time.
 //! * `starts=centre`: episodes begin at rest where the guide does, not spread over the initiation set.
 //! * `scale=0.01`: rewards are multiplied inside the algorithm; the task stays the same.
 //! * `normalise=true`: observations are normalised by those of the warm-up.
@@ -21,6 +22,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "an example is a command: it reads its arguments")]
 
+use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -35,7 +37,10 @@ use sharp_options::OptionKind;
 use sharp_plan::{
     Conditions, LearnFailure, LearningMonitor, LearningTask, LearntPolicy, Method, OptionLearner, Query,
 };
-use sharp_rl::{Actor, Evaluation, Normalisation, StopRule, TrainError, TrainSettings, evaluate, train};
+use sharp_rl::{
+    Actor, Environment, EnvironmentSpec, Evaluation, Normalisation, Step, StopRule, Stream, TrainError,
+    TrainSettings, evaluate, train,
+};
 use sharp_sim::{RobotState, SimulatorKind};
 use sharp_space::Seed;
 
@@ -83,6 +88,8 @@ struct LegExperiment {
     simulator: SimulatorKind,
     reward: ChangedReward,
     starts_at_centre: bool,
+    /// Actions without a move after which an episode is out of time; 0 for never.
+    still: usize,
     /// Whether the share that ends training is of episodes without contact.
     until_free: bool,
     train: TrainSettings,
@@ -97,6 +104,7 @@ impl LegExperiment {
             simulator: Method::paper().simulator,
             reward,
             starts_at_centre: false,
+            still: 0,
             until_free: false,
             train: TrainSettings::default().with(|train| {
                 train.max_env_steps = 60_000;
@@ -110,6 +118,7 @@ impl LegExperiment {
                 "simulator" => experiment.simulator = value.parse()?,
                 "contact" => experiment.reward.contact = value.parse()?,
                 "ends" => experiment.reward.contact_ends = value.parse()?,
+                "still" => experiment.still = value.parse()?,
                 "starts" if value == "centre" => experiment.starts_at_centre = true,
                 "scale" => experiment.train.sac.reward_scale = value.parse()?,
                 "normalise" if value == "true" => {
@@ -130,7 +139,8 @@ impl LegExperiment {
         } else {
             Arc::clone(&task.states)
         };
-        let learnt = option_task(task, task.conditions, &states, self.reward, "environment");
+        let inner = option_task(task, task.conditions, &states, self.reward, "environment");
+        let learnt = StillEnds { inner, after: self.still, trail: VecDeque::new() };
         let (mut best, mut is_stopped) = (None::<(Evaluation, Actor)>, false);
         let (mut failure, mut judging_s) = (None, 0.0);
         let planar = task.conditions.clone().with_simulator(task.world.simulator(SimulatorKind::Planar));
@@ -214,6 +224,37 @@ fn option_task(
         Arc::new(SingleOption { scenario, states: Arc::clone(states) }),
         task.seed.child(stream, 0),
     )
+}
+
+/// A task whose episodes are out of time once the robot has moved less than 0.1 m in `after` actions; 0 for never.
+#[derive(Clone)]
+struct StillEnds {
+    inner: OptionTask,
+    after: usize,
+    /// Where the robot was after the last actions.
+    trail: VecDeque<[f32; 2]>,
+}
+
+impl Environment for StillEnds {
+    fn spec(&self) -> EnvironmentSpec {
+        self.inner.spec()
+    }
+
+    fn reset(&mut self, rng: &mut Stream, observation: &mut [f32]) {
+        self.inner.reset(rng, observation);
+        self.trail = VecDeque::from([[observation[0], observation[1]]]);
+    }
+
+    fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
+        let step = self.inner.step(action, observation);
+        self.trail.push_back([observation[0], observation[1]]);
+        if self.after == 0 || self.trail.len() <= self.after {
+            return step;
+        }
+        let [x, y] = self.trail.pop_front().expect("longer than nothing");
+        let is_still = (observation[0] - x).hypot(observation[1] - y) < 0.1;
+        Step { truncated: !step.terminated && (step.truncated || is_still), ..step }
+    }
 }
 
 /// The paper's reward, and what a contact adds to it.

@@ -1,12 +1,15 @@
 //! Gaps: how far apart walls stand around a place.
 
-use crate::context::CHECK_STEP_M;
 use sharp_space::{DistanceField, Heading, Point, trig};
+
+use crate::context::CHECK_STEP_M;
 
 /// The width of a gap is known to this, cells.
 const STEP: f64 = 0.05;
 /// Directions in which a way's gap is measured: straight across and so far to both sides, radians.
-const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
+///
+/// Further to the sides lines would cut across corners, past which a way may lead.
+const ACROSS: [f64; 3] = [-0.25, 0.0, 0.25];
 
 /// The free length of the shortest line through `place` in one of the `directions` (radians), metres.
 #[must_use]
@@ -84,8 +87,9 @@ mod tests {
         let way = [Point::new(0.5, 1.1), Point::new(1.0, 1.1), Point::new(1.5, 1.1)];
         assert!((narrowest_gap_m(&field, &way, 0.4) - 0.75).abs() < 0.02, "the door is on the way");
         assert_eq!(narrowest_gap_m(&field, &way, 0.05), f64::INFINITY, "a small robot has room");
-        let round_a_corner = [(0.5, 0.3), (0.3, 0.3), (0.3, 0.5)].map(|(x, y)| Point::new(x, y));
-        let beside_m = narrowest_gap_m(&field, &round_a_corner, 0.4);
-        assert!(beside_m > 0.4, "nothing is in the way there: {beside_m}");
+        let room = OccupancyGrid::from_ascii(0.25, &["............"; 12].join("\n"));
+        let round_a_corner = [(0.4, 0.15), (0.15, 0.15), (0.15, 0.4)].map(|(x, y)| Point::new(x, y));
+        let beside_m = narrowest_gap_m(&DistanceField::new(&room.unwrap()), &round_a_corner, 0.4);
+        assert!(beside_m > 0.6, "a corner is no gap: {beside_m}");
     }
 }
