@@ -19,11 +19,11 @@ pub struct WidestPaths {
     /// Up the tree; roots are their own parents.
     parents: Vec<u32>,
     /// The link to the parent: the number of the added cell that made it, and its place in the order.
-    links: Vec<Link>,
+    links: Vec<TreeLink>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Link {
+struct TreeLink {
     /// Cells that were added before; no link has all of them.
     order: u32,
     cell: u32,
@@ -45,14 +45,14 @@ impl WidestPaths {
         let mut this = Self {
             frame,
             parents: (0..count).collect(),
-            links: vec![Link { order: u32::MAX, cell: u32::MAX }; count as usize],
+            links: vec![TreeLink { order: u32::MAX, cell: u32::MAX }; count as usize],
         };
         let (mut sizes, mut is_there) = (vec![1_u32; count as usize], vec![false; count as usize]);
         for (place, &Reverse((_, cell))) in order.iter().enumerate() {
             let index = cell as usize;
             is_there[index] = true;
             let (col, row) = (index % width, index / width);
-            let link = Link { order: place as u32, cell };
+            let link = TreeLink { order: place as u32, cell };
             let sides = [
                 (col > 0).then(|| index - 1),
                 (col + 1 < width).then(|| index + 1),
@@ -66,7 +66,7 @@ impl WidestPaths {
         this
     }
 
-    fn unite(&mut self, (a, b): (usize, usize), link: Link, sizes: &mut [u32]) {
+    fn unite(&mut self, (a, b): (usize, usize), link: TreeLink, sizes: &mut [u32]) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
             let (small, large) = if sizes[a] < sizes[b] { (a, b) } else { (b, a) };
@@ -95,7 +95,7 @@ impl WidestPaths {
         let mut narrowest = a;
         while a != b {
             let lower = if self.links[a] <= self.links[b] { &mut a } else { &mut b };
-            let Link { order, cell } = self.links[*lower];
+            let TreeLink { order, cell } = self.links[*lower];
             if order == u32::MAX {
                 return None;
             }
