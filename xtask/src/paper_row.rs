@@ -66,7 +66,7 @@ impl NamedRow<'_> {
     }
 
     /// What shares a library.
-    fn group(&self) -> String {
+    pub(crate) fn group(&self) -> String {
         let words = ["method", "env", "robot", "options"].map(|key| self.word(key));
         words.iter().filter(|word| **word != "none").copied().collect::<Vec<_>>().join("-")
     }

@@ -1,8 +1,8 @@
 //! `cargo xtask paper-table`: the paper's own protocol from end to end, in as many calls as it takes.
 //!
 //! The rows come from the example `paper_table` of `sharp-bench`, which also writes the section of the results and its
-//! figures. In between each row is measured with the `sharp` command, and its line is appended to a file of the repository. A
-//! call measures what has no line yet.
+//! figures. In between each row is measured with the `sharp` command, and its line goes to a file of the repository. A call
+//! measures what has no line yet.
 
 use std::fs;
 use std::io::Write;
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use crate::paper_row::{NamedRow, PaperSite, TIME_LIMIT_S};
@@ -91,18 +91,19 @@ impl PaperTable {
     /// Measures those of `rows` that have no line yet, while there is time; 3 if some are left.
     fn measure_missing(&self, rows: &[&Value]) -> anyhow::Result<u8> {
         let known: Vec<String> = read_lines()?.iter().map(|line| NamedRow(line).name()).collect();
-        let missing: Vec<&Value> =
-            rows.iter().copied().filter(|row| !known.contains(&NamedRow(row).name())).collect();
+        let missing = missing(rows, &known, |row| self.site.has_library(row));
+        let again: Vec<String> =
+            missing.iter().map(|row| NamedRow(row).name()).filter(|name| known.contains(name)).collect();
+        if !again.is_empty() {
+            eprintln!("their library is gone, so they are measured again: {}", again.join(", "));
+            remove_lines(&again)?;
+        }
         let mut left = missing.len();
         for together in missing.chunk_by(|a, b| are_measured_together(a, b)) {
             let remaining_s = self.site.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
             let is_flat = NamedRow(together[0]).word("method") == "sac";
             if remaining_s == 0.0 || (is_flat && remaining_s < FLAT_POLICY_S) {
                 break;
-            }
-            if let Some(row) = together.iter().find(|row| !self.site.has_library(&NamedRow(row))) {
-                let name = NamedRow(row).name();
-                bail!("the library of the problems before {name} is gone: remove their lines from {LINES}");
             }
             let results: Vec<anyhow::Result<Option<Value>>> = std::thread::scope(|scope| {
                 let begin = |row: &&Value| {
@@ -159,6 +160,24 @@ impl PaperTable {
     }
 }
 
+/// The `rows` that are not `known`. Where the library of the problems before is gone they are measured once more, because a
+/// problem without what they learnt is another one.
+fn missing<'a>(
+    rows: &[&'a Value],
+    known: &[String],
+    has_library: impl Fn(&NamedRow<'_>) -> bool,
+) -> Vec<&'a Value> {
+    let is_known = |row: &&Value| known.contains(&NamedRow(row).name());
+    let is_same = |a: &&Value, b: &&Value| NamedRow(a).group() == NamedRow(b).group();
+    let of_chain = |chain: &[&'a Value]| {
+        let done = chain.iter().take_while(|row| is_known(row)).count();
+        let begins_anew = chain.get(done).is_some_and(|row| !has_library(&NamedRow(row)));
+        let skipped = if begins_anew { 0 } else { done };
+        chain[skipped..].iter().copied().filter(|row| begins_anew || !is_known(row)).collect::<Vec<_>>()
+    };
+    rows.chunk_by(is_same).flat_map(of_chain).collect()
+}
+
 /// Flat policies of one environment learn on one core each.
 fn are_measured_together(a: &Value, b: &Value) -> bool {
     let (a, b) = (NamedRow(a), NamedRow(b));
@@ -186,6 +205,16 @@ fn append(line: &Value) -> anyhow::Result<()> {
         writeln!(file, "{line}").and_then(|()| file.sync_all()).map_err(|error| error.to_string())
     });
     written.map_err(|error| anyhow::anyhow!("cannot append to {LINES}: {error}"))
+}
+
+/// Removes the lines of the rows called `names`.
+fn remove_lines(names: &[String]) -> anyhow::Result<()> {
+    let kept = read_lines()?.into_iter().filter(|line| !names.contains(&NamedRow(line).name()));
+    let text: String = kept.map(|line| format!("{line}\n")).collect();
+    // A kill must not leave half a file: the lines took hours.
+    let fresh = root().join(OUT).join("lines.jsonl");
+    let written = fs::write(&fresh, text).and_then(|()| fs::rename(&fresh, root().join(LINES)));
+    written.with_context(|| format!("cannot write {LINES}"))
 }
 
 fn summary(line: &Value) -> String {
@@ -240,6 +269,23 @@ mod tests {
         ];
         let sizes: Vec<usize> = rows.chunk_by(are_measured_together).map(<[Value]>::len).collect();
         assert_eq!(sizes, [1, 1, 2, 1]);
+    }
+
+    #[test]
+    fn a_chain_without_its_library_begins_anew() {
+        let row = |env: &str, problem: u32| json!({"method": "paper", "env": env, "robot": "limo", "options": "centroid", "problem": problem});
+        let rows = [row("a", 1), row("a", 2), row("a", 3), row("b", 1), row("b", 2)];
+        let rows: Vec<&Value> = rows.iter().collect();
+        let known: Vec<String> = [rows[0], rows[1], rows[3]].map(|row| NamedRow(row).name()).into();
+        let left = |has_library: &dyn Fn(&NamedRow<'_>) -> bool| -> Vec<String> {
+            missing(&rows, &known, has_library).iter().map(|row| NamedRow(row).name()).collect()
+        };
+        assert_eq!(
+            left(&|_| true),
+            ["a-limo-centroid-p3", "b-limo-centroid-p2"].map(|name| format!("paper-{name}"))
+        );
+        let of_a = left(&|row| row.problem() == 1 || row.word("env") == "b");
+        assert_eq!(of_a.len(), 4, "all of a and the rest of b: {of_a:?}");
     }
 
     #[test]

@@ -13,7 +13,7 @@
 //! * `simulator=kinematic`: where it is learnt; rapier2d otherwise.
 //! * `contact=-10`: added to the reward of each step with a contact.
 //! * `ends=true`: a contact ends the episode.
-//! * `still=10`: an episode in which the robot has moved less than 0.1 m in so many actions is out of time.
+//! * `still=true`: an episode in which the robot stands still is out of time.
 //! * `starts=centre`: episodes begin at rest where the guide does, not spread over the initiation set.
 //! * `scale=0.01`: rewards are multiplied inside the algorithm; the task stays the same.
 //! * `normalise=true`: observations are normalised by those of the warm-up.
@@ -22,7 +22,6 @@
 
 #![allow(clippy::disallowed_methods, reason = "an example is a command: it reads its arguments")]
 
-use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -37,10 +36,7 @@ use sharp_options::OptionKind;
 use sharp_plan::{
     Conditions, LearnFailure, LearningMonitor, LearningTask, LearntPolicy, Method, OptionLearner, Query,
 };
-use sharp_rl::{
-    Actor, Environment, EnvironmentSpec, Evaluation, Normalisation, Step, StopRule, Stream, TrainError,
-    TrainSettings, evaluate, train,
-};
+use sharp_rl::{Actor, Evaluation, Normalisation, StopRule, TrainError, TrainSettings, evaluate, train};
 use sharp_sim::{RobotState, SimulatorKind};
 use sharp_space::Seed;
 
@@ -88,8 +84,8 @@ struct LegExperiment {
     simulator: SimulatorKind,
     reward: ChangedReward,
     starts_at_centre: bool,
-    /// Actions without a move after which an episode is out of time; 0 for never.
-    still: usize,
+    /// Whether an episode in which the robot stands still is out of time.
+    ends_at_standstill: bool,
     /// Whether the share that ends training is of episodes without contact.
     until_free: bool,
     train: TrainSettings,
@@ -104,7 +100,7 @@ impl LegExperiment {
             simulator: Method::paper().simulator,
             reward,
             starts_at_centre: false,
-            still: 0,
+            ends_at_standstill: false,
             until_free: false,
             train: TrainSettings::default().with(|train| {
                 train.max_env_steps = 60_000;
@@ -118,7 +114,7 @@ impl LegExperiment {
                 "simulator" => experiment.simulator = value.parse()?,
                 "contact" => experiment.reward.contact = value.parse()?,
                 "ends" => experiment.reward.contact_ends = value.parse()?,
-                "still" => experiment.still = value.parse()?,
+                "still" => experiment.ends_at_standstill = value.parse()?,
                 "starts" if value == "centre" => experiment.starts_at_centre = true,
                 "scale" => experiment.train.sac.reward_scale = value.parse()?,
                 "normalise" if value == "true" => {
@@ -139,8 +135,11 @@ impl LegExperiment {
         } else {
             Arc::clone(&task.states)
         };
-        let inner = option_task(task, task.conditions, &states, self.reward, "environment");
-        let learnt = StillEnds { inner, after: self.still, trail: VecDeque::new() };
+        let scenario = Scenario {
+            ends_at_standstill: self.ends_at_standstill,
+            ..scenario(task, task.conditions, self.reward)
+        };
+        let learnt = option_task(scenario, &states, task.seed.child("environment", 0));
         let (mut best, mut is_stopped) = (None::<(Evaluation, Actor)>, false);
         let (mut failure, mut judging_s) = (None, 0.0);
         let planar = task.conditions.clone().with_simulator(task.world.simulator(SimulatorKind::Planar));
@@ -197,20 +196,15 @@ impl OptionLearner for LegExperiment {
 fn judge(task: &LearningTask<'_>, conditions: &Conditions, actor: &Actor) -> Result<[f64; 2], TrainError> {
     let share = |contact_ends| {
         let reward = ChangedReward { paper: PseudoReward::default(), contact: 0.0, contact_ends };
-        let judged = option_task(task, conditions, &task.states, reward, "judge");
+        let scenario = scenario(task, conditions, reward);
+        let judged = option_task(scenario, &task.states, task.seed.child("judge", 0));
         evaluate(&mut [judged], actor, EPISODES, &mut task.seed.stream("judge", 0))
     };
     Ok([share(false)?.success_rate(), share(true)?.success_rate()])
 }
 
-fn option_task(
-    task: &LearningTask<'_>,
-    conditions: &Conditions,
-    states: &Arc<InitialStates>,
-    reward: ChangedReward,
-    stream: &str,
-) -> OptionTask {
-    let scenario = Scenario {
+fn scenario(task: &LearningTask<'_>, conditions: &Conditions, reward: ChangedReward) -> Scenario {
+    Scenario {
         world: task.world.clone(),
         simulator: conditions.simulator.fork(),
         noise: conditions.noise.clone(),
@@ -218,43 +212,14 @@ fn option_task(
         interface: PolicyInterface::Absolute { reach_m: task.world.robot.waypoint_reach_m },
         reward: Arc::new(reward),
         horizon_share: 1.0,
+        ends_at_standstill: false,
         start: RobotState::at_rest(task.option.guide.start()),
-    };
-    OptionTask::new(
-        Arc::new(SingleOption { scenario, states: Arc::clone(states) }),
-        task.seed.child(stream, 0),
-    )
+    }
 }
 
-/// A task whose episodes are out of time once the robot has moved less than 0.1 m in `after` actions; 0 for never.
-#[derive(Clone)]
-struct StillEnds {
-    inner: OptionTask,
-    after: usize,
-    /// Where the robot was after the last actions.
-    trail: VecDeque<[f32; 2]>,
-}
-
-impl Environment for StillEnds {
-    fn spec(&self) -> EnvironmentSpec {
-        self.inner.spec()
-    }
-
-    fn reset(&mut self, rng: &mut Stream, observation: &mut [f32]) {
-        self.inner.reset(rng, observation);
-        self.trail = VecDeque::from([[observation[0], observation[1]]]);
-    }
-
-    fn step(&mut self, action: &[f32], observation: &mut [f32]) -> Step {
-        let step = self.inner.step(action, observation);
-        self.trail.push_back([observation[0], observation[1]]);
-        if self.after == 0 || self.trail.len() <= self.after {
-            return step;
-        }
-        let [x, y] = self.trail.pop_front().expect("longer than nothing");
-        let is_still = (observation[0] - x).hypot(observation[1] - y) < 0.1;
-        Step { truncated: !step.terminated && (step.truncated || is_still), ..step }
-    }
+/// Episodes of `scenario` that begin in `states`.
+fn option_task(scenario: Scenario, states: &Arc<InitialStates>, seed: Seed) -> OptionTask {
+    OptionTask::new(Arc::new(SingleOption { scenario, states: Arc::clone(states) }), seed)
 }
 
 /// The paper's reward, and what a contact adds to it.

@@ -92,6 +92,7 @@ impl PeerTask {
             interface,
             reward,
             horizon_share: 1.0,
+            ends_at_standstill: false,
             start: RobotState::at_rest(self.option.guide.start()),
         };
         OptionTask::new(Arc::new(SingleOption { scenario, states: Arc::clone(&self.states) }), seed)

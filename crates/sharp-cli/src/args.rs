@@ -145,7 +145,7 @@ pub(crate) enum Learning {
     Fast,
     /// The paper's protocol.
     Paper,
-    /// The same, but a training ends at a success of 95 %, not at a mean return of 500.
+    /// The same, but a training ends at a success of 95 %, not at a mean return of 500, and an episode when the robot stands still.
     PaperSuccess,
     /// The shipped prior as it is, certified: what learning on the map is worth.
     Prior,

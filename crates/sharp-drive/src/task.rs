@@ -20,6 +20,7 @@ use crate::episode::{Episode, EpisodeRules, Motion};
 use crate::initial_states::InitialStates;
 use crate::network::PolicyInterface;
 use crate::situation::{GuideProgress, Observation};
+use crate::still::StandstillDetector;
 use crate::world::World;
 
 /// What one episode of learning consists of.
@@ -39,6 +40,9 @@ pub struct Scenario {
     pub reward: Arc<dyn Reward>,
     /// Share of each option's horizon after which an episode ends; 1 is the rule of estimates.
     pub horizon_share: f64,
+    /// Whether an episode in which the robot stands still is out of time at once ([`StandstillDetector`]). Otherwise a robot
+    /// that is wedged in fills the rest of its horizon, and the learner's memory, with steps in which nothing moves.
+    pub ends_at_standstill: bool,
     /// Where the robot begins.
     pub start: RobotState,
 }
@@ -178,7 +182,7 @@ struct ActionOutcome {
     /// The last option is done.
     success: bool,
     collided: bool,
-    /// The horizon is used up, and nothing else ended the episode.
+    /// The horizon is used up, or the robot stands still where that ends episodes, and nothing else ended this one.
     late: bool,
 }
 
@@ -209,6 +213,8 @@ struct RunningTask {
     horizon_share: f64,
     episode: Episode,
     automaton: Automaton,
+    /// `None` where standing still does not end episodes.
+    standstill: Option<StandstillDetector>,
 }
 
 impl RunningTask {
@@ -216,9 +222,10 @@ impl RunningTask {
     const PRIVILEGED_LEN: usize = 6;
 
     fn begin(scenario: Scenario, seed: Seed, number: u64) -> Self {
-        let Scenario { world, simulator, noise, links, interface, reward, horizon_share, start } = scenario;
+        let Scenario { world, noise, links, interface, reward, horizon_share, start, .. } = scenario;
         let rules = EpisodeRules::default().with_contact_ends(reward.contact_ends());
-        let mut episode = Episode::new(world.vehicle(&*simulator, &noise, rules.contact_ends), rules);
+        let mut episode =
+            Episode::new(world.vehicle(&*scenario.simulator, &noise, rules.contact_ends), rules);
         episode.begin(start, seed, number);
         let mut automaton = Automaton::new(links, Observation::first(start, &noise).without_slip_estimate());
         // The learner begins where its guide does.
@@ -226,7 +233,8 @@ impl RunningTask {
             let Ok(motion) = episode.carry_out(decision) else { break };
             automaton.observe(&world, &motion);
         }
-        Self { world, interface, reward, horizon_share, episode, automaton }
+        let standstill = scenario.ends_at_standstill.then(|| StandstillDetector::new(episode.state().pose));
+        Self { world, interface, reward, horizon_share, episode, automaton, standstill }
     }
 
     fn observe(&self, observation: &mut [f32]) {
@@ -262,7 +270,11 @@ impl RunningTask {
         let collided = motion.contact && self.reward.contact_ends();
         let done = !collided && self.automaton.is_done();
         let reward = self.reward(&motion, &before, done);
-        let late = f64::from(self.automaton.actions()) >= self.horizon_actions();
+        let is_still = self.standstill.as_mut().is_some_and(|standstill| {
+            standstill.observe(&motion.after.pose);
+            standstill.stands_still()
+        });
+        let late = is_still || f64::from(self.automaton.actions()) >= self.horizon_actions();
         // From here on the next option of the chain runs, if there is one.
         let success = done && !self.automaton.advance();
         ActionOutcome { reward, success, collided, late: late && !done && !collided }
@@ -303,20 +315,39 @@ mod tests {
         ]
     }
 
-    /// The task of `links` from the start of the first one's guide.
-    fn task(
+    /// Driving `links` from the start of the first one's guide.
+    fn scenario(
         world: &World,
         links: Vec<Link>,
         noise: NoiseModel,
         (interface, reward): (PolicyInterface, Arc<dyn Reward>),
+    ) -> Scenario {
+        Scenario {
+            world: world.clone(),
+            simulator: world.simulator(SimulatorKind::Kinematic),
+            noise,
+            interface,
+            reward,
+            horizon_share: 1.0,
+            ends_at_standstill: false,
+            start: RobotState::at_rest(links[0].option.guide.start()),
+            links: links.into(),
+        }
+    }
+
+    /// Episodes of `scenario` from its start.
+    fn single(scenario: Scenario) -> Arc<SingleOption> {
+        let states = Arc::new(InitialStates::exactly(scenario.start));
+        Arc::new(SingleOption { scenario, states })
+    }
+
+    fn task(
+        world: &World,
+        links: Vec<Link>,
+        noise: NoiseModel,
+        parts: (PolicyInterface, Arc<dyn Reward>),
     ) -> OptionTask {
-        let start = RobotState::at_rest(links[0].option.guide.start());
-        let simulator = world.simulator(SimulatorKind::Kinematic);
-        let (world, links) = (world.clone(), links.into());
-        let horizon_share = 1.0;
-        let scenario = Scenario { world, simulator, noise, links, interface, reward, horizon_share, start };
-        let states = Arc::new(InitialStates::exactly(start));
-        OptionTask::new(Arc::new(SingleOption { scenario, states }), Seed(1))
+        OptionTask::new(single(scenario(world, links, noise, parts)), Seed(1))
     }
 
     #[test]
@@ -352,6 +383,21 @@ mod tests {
     }
 
     #[test]
+    fn standing_still_may_end_an_episode_early() {
+        let (world, options) = (hall(), hall_options());
+        let parts = interfaces(&world).into_iter().next_back().expect("two");
+        let mut observation = vec![0.0; parts.0.observation_len()];
+        let links = vec![Link::new(options[1].clone(), None)];
+        let scenario =
+            Scenario { ends_at_standstill: true, ..scenario(&world, links, NoiseModel::none(), parts) };
+        let mut task = OptionTask::new(single(scenario), Seed(1));
+        task.reset(&mut Seed(1).stream("reset", 0), &mut observation);
+        let steps: Vec<Step> = (0..10).map(|_| task.step(&[0.0, 0.0], &mut observation)).collect();
+        assert!(steps[..9].iter().all(|step| !step.truncated), "not before five seconds: {steps:?}");
+        assert!(steps[9].truncated && !steps[9].terminated, "a time-out is no end of the decision process");
+    }
+
+    #[test]
     fn a_chain_runs_on_over_its_hand_overs() {
         let (world, options) = (hall(), hall_options());
         let parts = interfaces(&world).into_iter().next().expect("two");
@@ -374,13 +420,9 @@ mod tests {
     /// Slots that drive from the start of the hall, with this share of the horizon.
     fn batch(horizon_share: f64, slots: usize) -> DrivingBatch {
         let (world, options) = (hall(), hall_options());
-        let (interface, reward) = interfaces(&world).into_iter().next().expect("two");
-        let start = RobotState::at_rest(options[0].guide.start());
-        let simulator = world.simulator(SimulatorKind::Kinematic);
-        let (noise, links) = (NoiseModel::harsh(), Link::chain(&options).into());
-        let scenario = Scenario { world, simulator, noise, links, interface, reward, horizon_share, start };
-        let states = Arc::new(InitialStates::exactly(start));
-        DrivingBatch::new(Arc::new(SingleOption { scenario, states }), slots, Seed(1))
+        let parts = interfaces(&world).into_iter().next().expect("two");
+        let scenario = scenario(&world, Link::chain(&options), NoiseModel::harsh(), parts);
+        DrivingBatch::new(single(Scenario { horizon_share, ..scenario }), slots, Seed(1))
     }
 
     #[test]

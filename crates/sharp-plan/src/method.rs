@@ -91,7 +91,7 @@ pub struct RepairSettings {
 /// What an option is taken to cost before anything was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PriceRule {
-    /// The length of its guide at nominal speed: the paper's rule.
+    /// The length of its guide at nominal speed, and once it is learnt its time for each success: the paper's rule.
     Length,
     /// The time of a speed profile along its guide: slow in narrow places and before bends.
     Profile,
@@ -222,14 +222,16 @@ impl Method {
         .with_guides(guide)
     }
 
-    /// The paper's protocol but for its stop: a training ends when 95 % of its episodes succeed, not at a mean return of 500,
-    /// which policies meet that fail in two episodes of five (docs/algorithms/sac.md).
+    /// The paper's protocol with two changes to its trainings (docs/algorithms/sac.md): one ends when 95 % of its episodes
+    /// succeed, not at a mean return of 500, which policies meet that fail in two episodes of five; and an episode ends when
+    /// the robot stands still, because a robot that is wedged in learns nothing from the rest of it.
     #[must_use]
     pub fn paper_until_success() -> Self {
         let settings = TrainSettings::default().with(|train| {
             train.stop = StopRule::Success { rate: SUCCESS_WANTED, episodes: SUCCESS_EPISODES }
         });
-        Self::paper().with_learner("paper-success", Arc::new(PaperProtocol::new(settings)))
+        let protocol = PaperProtocol::new(settings).ending_at_standstill();
+        Self::paper().with_learner("paper-success", Arc::new(protocol))
     }
 
     /// The shipped prior as it is, to compare with: nothing to choose from, no training, no repairs.

@@ -192,6 +192,7 @@ impl ScenarioSource for RouteScenarios {
             links: (first..=last).map(link).collect(),
             reward: Arc::new(reward),
             horizon_share: HORIZON_SHARE,
+            ends_at_standstill: false,
             start: states[first].draw(rng),
             world: world.clone(),
         }

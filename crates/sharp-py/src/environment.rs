@@ -181,6 +181,7 @@ fn scenario(plan: &PyPlan, options: &TaskOptions) -> Result<Scenario, Raised> {
         simulator: world.simulator(simulator(&options.simulator)?),
         start: RobotState::at_rest(solved.solution.query.start),
         horizon_share: 1.0,
+        ends_at_standstill: false,
         links: links.into(),
         world,
         noise,

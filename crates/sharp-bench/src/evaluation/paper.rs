@@ -23,7 +23,7 @@ const TIME_LIMIT_S: f64 = 2400.0;
 /// One problem under one method.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct PaperRow {
-    /// `paper` and `fast` are SHARP with that learning; `rrt` and `sac` are the paper's baselines.
+    /// `paper`, `paper-success` and `fast` are SHARP with that learning; `rrt` and `sac` are the paper's baselines.
     pub method: String,
     /// The name of the map.
     pub env: String,
@@ -97,10 +97,41 @@ pub fn paper_rows() -> Vec<PaperRow> {
     let mut rows = sharp("fast", &all);
     rows.extend(of_baseline("rrt", &all, true));
     rows.extend(sharp("paper", &small));
+    rows.extend(sharp("paper-success", &small));
     rows.extend(sharp("paper", &large));
     rows.extend(of_baseline("sac", &all, false));
     rows
 }
+
+/// The protocol as the paper has it or with another stop: a table and three figures each.
+struct Protocol {
+    method: &'static str,
+    /// Titles of the figures of time, of success and of learning curves.
+    titles: [&'static str; 3],
+    /// Their files.
+    names: [&'static str; 3],
+}
+
+const PROTOCOLS: [Protocol; 2] = [
+    Protocol {
+        method: "paper",
+        titles: [
+            "The paper's protocol: time of each problem",
+            "The paper's protocol: success of each problem, contact allowed",
+            "The paper's protocol: mean return while options are learnt",
+        ],
+        names: ["paper-time", "paper-success", "paper-curves"],
+    },
+    Protocol {
+        method: "paper-success",
+        titles: [
+            "Trained until 95 % succeed: time of each problem",
+            "Trained until 95 % succeed: success of each problem, contact allowed",
+            "Trained until 95 % succeed: mean return while options are learnt",
+        ],
+        names: ["paper-95-time", "paper-95-success", "paper-95-curves"],
+    },
+];
 
 const ROBOTS: [&str; 2] = ["husky", "limo"];
 
@@ -176,7 +207,7 @@ impl PaperLine {
 pub fn write_paper(lines: &[PaperLine], page: &str, images: &Path) -> Result<String, ReportError> {
     let lines: BTreeMap<&PaperRow, &PaperLine> = lines.iter().map(|line| (&line.row, line)).collect();
     let lines: Vec<&PaperLine> = lines.into_values().collect();
-    for figure in figures(&lines) {
+    for figure in PROTOCOLS.iter().flat_map(|protocol| figures(&lines, protocol)) {
         let (svg, _) = figure.to_svg();
         write_atomic(&images.join(format!("{}.svg", figure.name)), svg.as_bytes())?;
     }
@@ -194,26 +225,22 @@ fn between_marks(page: &str, text: &str) -> String {
 }
 
 /// Time and success of each problem as the paper draws them, and learning curves.
-fn figures(lines: &[&PaperLine]) -> Vec<Figure> {
-    let shown: Vec<(&PaperLine, SuccessCount)> = lines
-        .iter()
-        .filter(|line| line.row.method != "fast")
-        .map(|line| (*line, line.with_contact.unwrap_or(SuccessCount { episodes: 20, successes: 0 })))
-        .collect();
-    if !lines.iter().any(|line| line.row.method == "paper") {
+fn figures(lines: &[&PaperLine], protocol: &Protocol) -> Vec<Figure> {
+    let is_own = |line: &&PaperLine| line.row.method == protocol.method;
+    if !lines.iter().any(is_own) {
         return vec![];
     }
-    let results: Vec<ResultLine> = shown.iter().map(|(line, count)| line.as_result(*count)).collect();
+    let shown = lines.iter().filter(|line| is_own(line) || line.row.options == "none");
+    let result = |line: &&PaperLine| {
+        line.as_result(line.with_contact.unwrap_or(SuccessCount { episodes: 20, successes: 0 }))
+    };
+    let results: Vec<ResultLine> = shown.map(result).collect();
     let results: Vec<&ResultLine> = results.iter().collect();
-    let mut figures = vec![
-        rows::time("paper-time", "The paper's protocol: time of each problem", &results),
-        rows::success(
-            "paper-success",
-            "The paper's protocol: success of each problem, contact allowed",
-            &results,
-        ),
-    ];
-    figures.extend(curves::figure(lines));
+    let ([time, success, curves], titles) = (protocol.names, protocol.titles);
+    let own: Vec<&PaperLine> = lines.iter().copied().filter(|line| is_own(&line)).collect();
+    let mut figures =
+        vec![rows::time(time, titles[0], &results), rows::success(success, titles[1], &results)];
+    figures.extend(curves::figure((curves, titles[2]), own));
     figures
 }
 
@@ -253,7 +280,7 @@ mod tests {
     fn the_table_has_every_case_of_the_paper_once() {
         let rows = paper_rows();
         let count = |method: &str| rows.iter().filter(|row| row.method == method).count();
-        assert_eq!(["fast", "paper", "rrt", "sac"].map(count), [92, 92, 46, 14]);
+        assert_eq!(["fast", "paper", "paper-success", "rrt", "sac"].map(count), [92, 92, 80, 46, 14]);
         let names: std::collections::BTreeSet<&PaperRow> = rows.iter().collect();
         assert_eq!(names.len(), rows.len(), "no row twice");
     }
@@ -270,7 +297,7 @@ mod tests {
             "{page}"
         );
         for expected in [
-            "2 of 244 rows are there",
+            "2 of 324 rows are there",
             "Of `a` 2 problems were measured and 2 ended with a plan within 2400 s. Those plans arrive in 60 % of \
              executions with contact allowed, and in 0 % where a contact is a failure.",
             "| a | husky | interface | 2 of 2 | 300 (-) | 60 % (-) | 0 % (-) | 2/6 | 43 % |",
@@ -286,6 +313,6 @@ mod tests {
             assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{name}: {svg}");
         }
         let empty = write_paper(&[], &page, folder.path()).expect("no figures");
-        assert!(empty.contains("0 of 244 rows"), "{empty}");
+        assert!(empty.contains("0 of 324 rows"), "{empty}");
     }
 }

@@ -25,6 +25,8 @@ pub(crate) struct NetworkTraining<'a> {
     pub(crate) interface: PolicyInterface,
     pub(crate) reward: Arc<dyn Reward>,
     pub(crate) learner: &'a dyn Learner,
+    /// Whether an episode in which the robot stands still is out of time.
+    pub(crate) ends_at_standstill: bool,
     /// Environments that are stepped in turn.
     pub(crate) environments: u64,
 }
@@ -126,6 +128,7 @@ fn scenario(task: &LearningTask<'_>, training: &NetworkTraining<'_>) -> Scenario
         interface: training.interface,
         reward: Arc::clone(&training.reward),
         horizon_share: 1.0,
+        ends_at_standstill: training.ends_at_standstill,
         start: RobotState::at_rest(task.option.guide.start()),
     }
 }

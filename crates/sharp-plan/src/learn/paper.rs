@@ -17,19 +17,31 @@ pub struct PaperProtocol {
     pub learner: Arc<dyn Learner>,
     /// What it is paid.
     pub reward: Arc<dyn Reward>,
+    /// Whether an episode in which the robot stands still is out of time; false is the paper's rule.
+    pub ends_at_standstill: bool,
 }
 
 impl PaperProtocol {
     /// Soft actor-critic with these settings.
     #[must_use]
     pub fn new(settings: TrainSettings) -> Self {
-        Self { learner: Arc::new(SacLearner::new(settings)), reward: Arc::new(PseudoReward::default()) }
+        Self {
+            learner: Arc::new(SacLearner::new(settings)),
+            reward: Arc::new(PseudoReward::default()),
+            ends_at_standstill: false,
+        }
     }
 
     /// The same with another learner.
     #[must_use]
     pub fn with_learner(self, learner: Arc<dyn Learner>) -> Self {
         Self { learner, ..self }
+    }
+
+    /// The same, but an episode in which the robot stands still is out of time.
+    #[must_use]
+    pub fn ending_at_standstill(self) -> Self {
+        Self { ends_at_standstill: true, ..self }
     }
 
     /// The same with another reward.
@@ -55,6 +67,7 @@ impl OptionLearner for PaperProtocol {
             interface: PolicyInterface::Absolute { reach_m: task.world.robot.waypoint_reach_m },
             reward: Arc::clone(&self.reward),
             learner: &*self.learner,
+            ends_at_standstill: self.ends_at_standstill,
             environments: 1,
         };
         train_network(task, &training, monitor)

@@ -172,6 +172,7 @@ impl Selection {
             interface: prior_interface(robot, PolicyContext::new(&task.conditions.noise, 1.0)),
             reward: Arc::new(reward),
             learner: &learner,
+            ends_at_standstill: false,
             environments: self.environments,
         };
         train_network(task, &training, monitor)

@@ -17,17 +17,19 @@ const EVERY: u64 = 10_000;
 const MOST: u64 = 150_000;
 
 /// One panel a robot and kind of option; `None` where nothing was trained.
-pub(super) fn figure(lines: &[&PaperLine]) -> Option<Figure> {
-    let is_trained = |line: &&PaperLine| line.row.method == "paper" && line.trained().next().is_some();
-    let mut lines: Vec<&PaperLine> = lines.iter().copied().filter(is_trained).collect();
+pub(super) fn figure(
+    (name, title): (&'static str, &'static str),
+    mut lines: Vec<&PaperLine>,
+) -> Option<Figure> {
+    lines.retain(|line| line.trained().next().is_some());
     lines.sort_by_key(|line| (&line.row.robot, &line.row.options));
     let same =
         |a: &&PaperLine, b: &&PaperLine| (&a.row.robot, &a.row.options) == (&b.row.robot, &b.row.options);
     let panels: Vec<Panel> = lines.chunk_by(same).map(panel).collect();
     let kinds = lines.iter().map(|line| line.row.options.as_str());
     (!panels.is_empty()).then(|| Figure {
-        name: "paper-curves",
-        title: "The paper's protocol: mean return while options are learnt",
+        name,
+        title,
         caption: String::new(),
         legend: method_legend(kinds),
         panels,

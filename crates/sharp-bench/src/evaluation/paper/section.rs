@@ -8,7 +8,7 @@ use sharp_drive::SuccessCount;
 use sharp_rl::StopReason;
 
 use super::super::reuse;
-use super::{PaperLeg, PaperLine, PaperRow, TIME_LIMIT_S, paper_rows};
+use super::{PROTOCOLS, PaperLeg, PaperLine, PaperRow, Protocol, TIME_LIMIT_S, paper_rows};
 
 /// Everything between the marks.
 pub(super) fn text(lines: &[&PaperLine]) -> String {
@@ -29,18 +29,29 @@ pub(super) fn text(lines: &[&PaperLine]) -> String {
     let of = |method: &str| -> Vec<&PaperLine> {
         lines.iter().copied().filter(|line| line.row.method == method).collect()
     };
-    let (paper, fast) = (of("paper"), of("fast"));
-    text += &totals(&paper);
-    if !paper.is_empty() {
-        text += "\n![Time of each problem](images/paper-time.svg)\n\n\
-                 ![Success of each problem, contact allowed](images/paper-success.svg)\n\n\
-                 ![Mean return while options are learnt](images/paper-curves.svg)\n";
-        text += &groups(&paper, &fast);
-        text += &problems(&paper, &fast);
+    let fast = of("fast");
+    for protocol in &PROTOCOLS {
+        let lines = of(protocol.method);
+        if !lines.is_empty() {
+            text += &of_protocol(protocol, &lines, &fast);
+        }
     }
     text += &baselines(&of("rrt"), &of("sac"));
-    text += &unlearnt(&paper);
     text += &missing(lines, &rows);
+    text
+}
+
+/// What was measured of the paper's protocol, or of the one with another stop.
+fn of_protocol(protocol: &Protocol, lines: &[&PaperLine], fast: &[&PaperLine]) -> String {
+    let Protocol { method, titles, names } = protocol;
+    let mut text = format!("\n### `--learning {method}`\n");
+    text += &totals(lines);
+    for (title, name) in titles.iter().zip(names) {
+        _ = write!(text, "\n![{title}](images/{name}.svg)\n");
+    }
+    text += &groups(lines, fast);
+    text += &problems(lines, fast);
+    text += &unlearnt(lines);
     text
 }
 
@@ -128,7 +139,7 @@ fn mean_wall(lines: &[&PaperLine], decimals: usize) -> String {
 fn problems(paper: &[&PaperLine], fast: &[&PaperLine]) -> String {
     let mut text = String::from(
         "\nEach problem. *Steps* are those of its trainings, the median and the most; *no stop* are trainings that used up \
-         150,000 steps before their mean return was 500:\n\n\
+         150,000 steps before they met it:\n\n\
          | problem | status | wall s | cpu s | trained | reused | steps | no stop | contact allowed | without | default: s | without |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
@@ -221,7 +232,7 @@ fn unlearnt(lines: &[&PaperLine]) -> String {
     if text.is_empty() {
         return text;
     }
-    "\nTrainings whose mean return did not reach 500, with the best return and the last success with and without contact:\n\n\
+    "\nTrainings that did not meet their stop, with the best return and the last success with and without contact:\n\n\
      | problem | option | m | steps | ended by | best return | success |\n|---|---|---|---|---|---|---|\n"
         .to_owned()
         + &text
