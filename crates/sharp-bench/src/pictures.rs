@@ -1,6 +1,6 @@
 //! Which pictures belong to a result, and where they go.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use sharp_draw::{Scene, Trajectory, svg_to_png};
 use sharp_drive::EpisodeEnd;
@@ -20,6 +20,35 @@ const PNG_SIDE_PX: u32 = 1200;
 pub fn write(folder: &Path, name: &str, svg: &str) -> Result<(), BenchError> {
     write_atomic(&folder.join(format!("{name}.svg")), svg.as_bytes())?;
     write_atomic(&folder.join(format!("{name}.png")), &svg_to_png(svg, PNG_SIDE_PX)?)?;
+    Ok(())
+}
+
+/// The same of a picture that `draw`s the same every time: it is taken from `kept`, a path without extension, if it is
+/// there, and kept there otherwise. A folder that cannot be written keeps nothing.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_kept(
+    folder: &Path,
+    name: &str,
+    kept: Option<&Path>,
+    draw: &dyn Fn() -> String,
+) -> Result<(), BenchError> {
+    let files = ["svg", "png"].map(|extension| {
+        let kept = kept.map(|path| path.with_extension(extension));
+        (kept, folder.join(format!("{name}.{extension}")))
+    });
+    let read = |(kept, _): &(Option<PathBuf>, PathBuf)| std::fs::read(kept.as_ref()?).ok();
+    if let [Some(svg), Some(png)] = files.each_ref().map(read) {
+        write_atomic(&files[0].1, &svg)?;
+        write_atomic(&files[1].1, &png)?;
+        return Ok(());
+    }
+    write(folder, name, &draw())?;
+    for (kept, path) in files {
+        let Some(kept) = kept else { continue };
+        let _ = std::fs::read(path).map(|bytes| write_atomic(&kept, &bytes));
+    }
     Ok(())
 }
 

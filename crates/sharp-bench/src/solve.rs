@@ -1,6 +1,6 @@
 //! Solving one problem whole: library, abstraction, Algorithm 1, report, and the folder of the plan.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use sharp_options::OptionKind;
@@ -78,6 +78,8 @@ pub struct Solved {
     /// The robot in its building, with what it knows.
     sharp: Sharp,
     file: AbstractionFile,
+    /// Where the library keeps the picture of the abstraction, without extension.
+    picture: Option<PathBuf>,
 }
 
 /// Algorithm 1 on `problem`, with what the library holds.
@@ -97,6 +99,7 @@ pub fn solve(
     let SolveSettings { abstraction, method, simulator, seed } = settings;
     query.check(world)?;
     let library = settings.library(world, noise_model, folders)?;
+    let picture = library.folder().map(|folder| folder.join(abstraction.file_name()).with_extension(""));
     monitor.phase(Phase::Done);
     let (sharp, file) = prepare(world.clone(), abstraction, library.folder(), monitor)?;
     let mut sharp = sharp
@@ -119,7 +122,7 @@ pub fn solve(
     }
     monitor.phase(Phase::Done);
     let report = SolveReport { time_s: monitor.times(), ..report };
-    Ok(Solved { report, plan, sharp, file })
+    Ok(Solved { report, plan, sharp, file, picture })
 }
 
 /// How often `tour` arrives where the robot may plan anew on the way, if it often has to; `None` for methods that stick to
@@ -278,7 +281,7 @@ impl Solved {
     /// # Errors
     /// If a picture cannot be drawn or a file cannot be written.
     pub fn write(&mut self, folder: &Path, name: &Path) -> Result<(), BenchError> {
-        let Self { report, plan, file, .. } = self;
+        let Self { report, plan, file, picture, .. } = self;
         let Some(plan) = plan else { return Ok(()) };
         report.plan_dir = Some(name.display().to_string());
         plan.save(folder, file)?;
@@ -286,7 +289,11 @@ impl Solved {
         sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
         // They take as long as the answer.
         let (of_states, of_plan) = rayon::join(
-            || pictures::write(folder, "abstraction", &pictures::abstraction(grid, &plan.abstraction)),
+            || {
+                pictures::write_kept(folder, "abstraction", picture.as_deref(), &|| {
+                    pictures::abstraction(grid, &plan.abstraction)
+                })
+            },
             || pictures::write(folder, "plan", &pictures::plan(plan, &plan.solution.query, &[])),
         );
         of_states.and(of_plan)?;

@@ -59,8 +59,8 @@ pub fn solve(
     abstraction: &Abstraction,
     library: &mut OptionLibrary,
 ) -> Result<Outcome, FileError> {
-    let PlanningProblem { world, method, conditions, .. } = *problem;
-    let known = KnownOptions::new(world, abstraction, method, &conditions.noise, library);
+    let PlanningProblem { world, method, .. } = *problem;
+    let known = KnownOptions::new(world, abstraction, method, library);
     solve_with(problem, abstraction, library, &Arc::new(known))
 }
 

@@ -16,7 +16,7 @@ use sharp_space::Seed;
 use crate::abstraction::Abstraction;
 use crate::conditions::Conditions;
 use crate::files::FileError;
-use crate::hand_over::{DrivenOption, HandOver, chain_key, drive_hand_over, identity};
+use crate::hand_over::{DrivenOption, HandOver, Identities, chain_key, drive_hand_over};
 use crate::learn::{LearnFailure, LearningTask, LearntPolicy};
 use crate::library::{OptionLibrary, StoredOption};
 use crate::method::Method;
@@ -206,8 +206,9 @@ impl BuildingTask<'_> {
         work: &mut BuildingWork,
     ) -> Result<(), FileError> {
         let Self { roster, share, monitor, .. } = *self;
+        let mut hashed = Identities::default();
         let identities: Vec<Option<String>> =
-            roster.options.iter().map(|option| known_identity(library, option)).collect();
+            roster.options.iter().map(|option| known_identity(library, option, &mut hashed)).collect();
         let known = library.hand_overs_by_key();
         let (mut all, mut is_whole) = (Vec::with_capacity(roster.hand_overs.len()), true);
         for (unit, block) in roster.hand_overs.chunks(BLOCK).enumerate() {
@@ -363,9 +364,13 @@ fn named(roster: &Roster, chain: &[usize], hand_over: HandOver) -> HandOver {
     HandOver { before: pair[0], after: pair[1], run_up: run_up.to_vec(), ..hand_over }
 }
 
-fn known_identity(library: &OptionLibrary, option: &RosterOption) -> Option<String> {
+fn known_identity(
+    library: &OptionLibrary,
+    option: &RosterOption,
+    identities: &mut Identities,
+) -> Option<String> {
     let stored = library.get(option.id).filter(|stored| stored.corridor == option.corridor)?;
-    Some(identity(&stored.corridor, &stored.learnt.policy))
+    Some(identities.of(&stored.corridor, &stored.learnt.policy))
 }
 
 #[cfg(test)]

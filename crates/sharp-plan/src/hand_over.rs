@@ -6,6 +6,7 @@
 //! guides, by robots that have driven three metres before the first cut. Where the first option is too short for that,
 //! they come from the option before it that leads on most straight.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,7 @@ use sharp_drive::{
 use sharp_guide::{GuidedOption, join_guides};
 use sharp_options::OptionId;
 use sharp_rbvd::StateId;
+use sharp_rl::Actor;
 use sharp_space::Seed;
 
 use crate::conditions::Conditions;
@@ -64,18 +66,33 @@ impl HandOver {
     }
 }
 
-/// A hash of what decides how an option is driven: its corridor and its policy.
-pub(crate) fn identity(corridor: &str, policy: &OptionPolicy) -> String {
-    let policy = match policy {
-        OptionPolicy::Network(network) => format!("{:?} {}", network.interface, weights_hash(network)),
-        other => format!("{other:?}"),
-    };
-    files::hash(format!("{corridor} {policy}").as_bytes())
+/// Hashes of what decides how options are driven. Many options share a network, which is hashed once.
+#[derive(Debug, Default)]
+pub(crate) struct Identities {
+    weights: Vec<(Arc<Actor>, String)>,
 }
 
-fn weights_hash(network: &sharp_drive::NetworkPolicy) -> String {
-    use std::collections::BTreeMap;
-    files::hash(&network.actor.to_bytes(&BTreeMap::new()))
+impl Identities {
+    /// Of an option with this corridor and policy.
+    pub(crate) fn of(&mut self, corridor: &str, policy: &OptionPolicy) -> String {
+        let policy = match policy {
+            OptionPolicy::Network(network) => {
+                format!("{:?} {}", network.interface, self.weights_hash(&network.actor))
+            }
+            other => format!("{other:?}"),
+        };
+        files::hash(format!("{corridor} {policy}").as_bytes())
+    }
+
+    fn weights_hash(&mut self, actor: &Arc<Actor>) -> &str {
+        let known = self.weights.iter().position(|(known, _)| Arc::ptr_eq(known, actor));
+        let index = known.unwrap_or_else(|| {
+            let hash = files::hash(&actor.to_bytes(&BTreeMap::new()));
+            self.weights.push((Arc::clone(actor), hash));
+            self.weights.len() - 1
+        });
+        &self.weights[index].1
+    }
 }
 
 /// The key of the hand-over between the last two of options with these identities, in the order of driving.

@@ -1,27 +1,26 @@
 //! What a library knows, made ready for many searches: guided options, their prices, and what hand-overs cost.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 use sharp_drive::{SuccessEstimate, World};
 use sharp_guide::{Goal, GuidedOption, LegId, NoGuide};
 use sharp_options::OptionId;
-use sharp_sim::NoiseModel;
 use sharp_space::Point;
 
 use crate::abstraction::Abstraction;
-use crate::hand_over::{HandOver, chain_key, identity};
+use crate::hand_over::{HandOver, Identities, chain_key};
 use crate::library::OptionLibrary;
 use crate::method::Method;
 use crate::price::{Price, Pricer};
 use crate::roster::fingerprint;
 
-/// The options of a library in one building under one method. Making it takes some tens of microseconds an option; a
-/// search that is given it finds all of them guided and priced.
+/// The options of a library in one building under one method. A search that is given it finds all of them guided, and
+/// those priced that an earlier search has asked for.
 #[derive(Debug, Default)]
 pub struct KnownOptions {
-    guided: BTreeMap<LegId, (Arc<GuidedOption>, Price)>,
+    guided: BTreeMap<LegId, KnownOption>,
     /// Options without a guide.
     unguided: BTreeMap<LegId, NoGuide>,
     hand_overs: BTreeMap<(OptionId, OptionId), SuccessEstimate>,
@@ -29,19 +28,19 @@ pub struct KnownOptions {
     charges: BTreeMap<(LegId, LegId), f64>,
 }
 
+#[derive(Debug)]
+struct KnownOption {
+    option: Arc<GuidedOption>,
+    /// Asked for by a few of the options of a large building only.
+    price: OnceLock<Price>,
+}
+
 impl KnownOptions {
     /// Those options of `library` that `abstraction` has, and its hand-overs between them. A hand-over counts only for the
     /// guides and policies it was driven with.
     #[must_use]
-    pub fn new(
-        world: &World,
-        abstraction: &Abstraction,
-        method: &Method,
-        noise: &NoiseModel,
-        library: &OptionLibrary,
-    ) -> Self {
+    pub fn new(world: &World, abstraction: &Abstraction, method: &Method, library: &OptionLibrary) -> Self {
         let space = abstraction.space(method.search.allowed);
-        let pricer = Pricer::new(world, noise, method.search, method.failure_cost_s);
         // Options end at endpoints: this goal belongs to none of them.
         let goal = Goal::new(Point::origin(), world.robot.goal_tolerance_m, world.geometry.clearance());
         let stored: Vec<_> =
@@ -49,8 +48,7 @@ impl KnownOptions {
         let guided = stored.par_iter().map(|&(id, stored)| {
             let (leg, ends) = (LegId::Option(id), (id.from(), id.to()));
             let option = GuidedOption::new(&space, leg, ends, stored.guide.clone(), goal.clone());
-            let price = pricer.price(&option, None);
-            (leg, (Arc::new(option), price))
+            (leg, KnownOption { option: Arc::new(option), price: OnceLock::new() })
         });
         let guided = guided.collect();
         let mut this = Self { guided, ..Self::default() };
@@ -58,9 +56,10 @@ impl KnownOptions {
             library.building(&fingerprint(&abstraction.options)).map(|building| &building.unguided);
         this.unguided =
             unguided.into_iter().flatten().map(|&id| (LegId::Option(id), NoGuide::Unreachable)).collect();
+        let mut hashed = Identities::default();
         let identities: BTreeMap<OptionId, String> = stored
             .iter()
-            .map(|&(id, stored)| (id, identity(&stored.corridor, &stored.learnt.policy)))
+            .map(|&(id, stored)| (id, hashed.of(&stored.corridor, &stored.learnt.policy)))
             .collect();
         for HandOver { before, after, run_up, key, count, mean_time_s } in library.hand_overs() {
             let chain = run_up.iter().chain([before, after]).map(|id| identities.get(id).map(String::as_str));
@@ -87,11 +86,13 @@ impl KnownOptions {
     /// The option called `id` with its guide, or why it has none.
     pub(crate) fn found(&self, id: LegId) -> Option<Result<&Arc<GuidedOption>, &NoGuide>> {
         let unguided = || self.unguided.get(&id).map(Err);
-        self.guided.get(&id).map(|(option, _)| Ok(option)).or_else(unguided)
+        self.guided.get(&id).map(|known| Ok(&known.option)).or_else(unguided)
     }
 
-    pub(crate) fn price(&self, id: LegId) -> Option<&Price> {
-        self.guided.get(&id).map(|(_, price)| price)
+    /// The price of the option called `id` by `pricer`, which is that of the method.
+    pub(crate) fn price(&self, id: LegId, pricer: &Pricer<'_>) -> Option<&Price> {
+        let known = self.guided.get(&id)?;
+        Some(known.price.get_or_init(|| pricer.price(&known.option, None)))
     }
 
     pub(crate) fn charge(&self, pair: (LegId, LegId)) -> Option<f64> {

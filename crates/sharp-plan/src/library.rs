@@ -12,6 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sharp_drive::{
     Follower, NetworkPolicy, OptionPolicy, PolicyInterface, ProfiledFollower, SuccessCount, SuccessEstimate,
@@ -226,8 +227,9 @@ impl OptionLibrary {
         let mut files = BTreeMap::new();
         // Whoever saves meanwhile has an intent before, or after, or both.
         let before = read_intents(&folder)?;
-        for path in option_files(&folder)? {
-            let file = read_option(&path)?;
+        let read: Vec<_> = option_files(&folder)?.par_iter().map(|path| read_option(path)).collect();
+        for file in read {
+            let file = file?;
             files.insert(file.id, file);
         }
         let after = read_intents(&folder)?;

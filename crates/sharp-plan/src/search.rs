@@ -221,7 +221,7 @@ impl<'a> Search<'a> {
 
     /// The price of a guided option.
     fn price(&self, id: LegId) -> Option<&Price> {
-        self.prices.get(&id).or_else(|| self.known.as_ref()?.price(id))
+        self.prices.get(&id).or_else(|| self.known.as_ref()?.price(id, &self.pricer))
     }
 
     /// Notes the guide of the option called `id`, or that it has none.

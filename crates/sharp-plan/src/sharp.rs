@@ -231,11 +231,11 @@ impl Sharp {
 
     /// What the library knows of `abstraction`, made ready for searches; made again when the library has changed.
     fn known(&mut self, abstraction: &Abstraction) -> Arc<KnownOptions> {
-        let Self { world, method, conditions, library, .. } = self;
+        let Self { world, method, library, .. } = self;
         let version = library.version();
         let is_current = self.known.as_ref().is_some_and(|(made_of, _)| *made_of == version);
         if !is_current {
-            let known = KnownOptions::new(world, abstraction, method, &conditions.noise, library);
+            let known = KnownOptions::new(world, abstraction, method, library);
             self.known = Some((version, Arc::new(known)));
         }
         self.known.as_ref().map(|(_, known)| Arc::clone(known)).expect("just made")
