@@ -11,12 +11,12 @@
 //! goes on behind the paper's stop until a share of 0.95 succeeds, so that one run shows what either stop gives. Changes:
 //!
 //! * `simulator=kinematic`: where it is learnt; rapier2d otherwise.
-//! * `contact=-10`: added to the reward of each step with a contact.
-//! * `ends=true`: a contact ends the episode.
+//! * `contact=-10`: added to the reward of each step with a contact; an episode with a contact is no success then.
 //! * `still=true`: an episode in which the robot stands still is out of time.
 //! * `starts=centre`: episodes begin at rest where the guide does, not spread over the initiation set.
 //! * `scale=0.01`: rewards are multiplied inside the algorithm; the task stays the same.
 //! * `normalise=true`: observations are normalised by those of the warm-up.
+//! * `hidden=64`, `batch=128`, `rate=1e-3`: units in each hidden layer, transitions in a gradient step, and its size.
 //! * `until=free`: training goes on until the share of 0.95 succeeds without contact.
 //! * `steps=60000`, `seed=1`: the budget, and the root of all randomness.
 
@@ -31,7 +31,7 @@ use sharp_drive::{
     Follower, InitialStates, Link, OptionPolicy, OptionTask, PolicyInterface, Scenario, SingleOption,
     SuccessCount, SuccessEstimate,
 };
-use sharp_guide::{PseudoReward, Reward, Transition};
+use sharp_guide::PseudoReward;
 use sharp_options::OptionKind;
 use sharp_plan::{
     Conditions, LearnFailure, LearningMonitor, LearningTask, LearntPolicy, Method, OptionLearner, Query,
@@ -82,7 +82,7 @@ struct LegExperiment {
     /// Its name; `list` for none.
     leg: String,
     simulator: SimulatorKind,
-    reward: ChangedReward,
+    reward: PseudoReward,
     starts_at_centre: bool,
     /// Whether an episode in which the robot stands still is out of time.
     ends_at_standstill: bool,
@@ -94,11 +94,10 @@ struct LegExperiment {
 
 impl LegExperiment {
     fn parse(leg: &str, changes: &[String]) -> Result<Self, Failure> {
-        let reward = ChangedReward { paper: PseudoReward::default(), contact: 0.0, contact_ends: false };
         let mut experiment = Self {
             leg: leg.to_owned(),
             simulator: Method::paper().simulator,
-            reward,
+            reward: PseudoReward::default(),
             starts_at_centre: false,
             ends_at_standstill: false,
             until_free: false,
@@ -113,13 +112,21 @@ impl LegExperiment {
             match name {
                 "simulator" => experiment.simulator = value.parse()?,
                 "contact" => experiment.reward.contact = value.parse()?,
-                "ends" => experiment.reward.contact_ends = value.parse()?,
                 "still" => experiment.ends_at_standstill = value.parse()?,
                 "starts" if value == "centre" => experiment.starts_at_centre = true,
                 "scale" => experiment.train.sac.reward_scale = value.parse()?,
                 "normalise" if value == "true" => {
                     experiment.train.normalisation = Normalisation::FromWarmup;
                 }
+                "hidden" => experiment.train.sac.hidden = vec![value.parse()?; 2],
+                "batch" => experiment.train.sac.batch = value.parse()?,
+                "gamma" => experiment.train.sac.gamma = value.parse()?,
+                "tau" => experiment.train.sac.tau = value.parse()?,
+                "nstep" => experiment.train.sac.n_step = value.parse()?,
+                "warmup" => experiment.train.sac.warmup_steps = value.parse()?,
+                "alpha" => experiment.train.sac.initial_alpha = value.parse()?,
+                "updates" => experiment.train.sac.updates_per_step = value.parse()?,
+                "rate" => experiment.train.sac.learning_rate = value.parse()?,
                 "until" if value == "free" => experiment.until_free = true,
                 "steps" => experiment.train.max_env_steps = value.parse()?,
                 "seed" => experiment.seed = Seed(value.parse()?),
@@ -194,16 +201,16 @@ impl OptionLearner for LegExperiment {
 
 /// Shares of episodes in which `actor` succeeds, with contact allowed and with contact as failure.
 fn judge(task: &LearningTask<'_>, conditions: &Conditions, actor: &Actor) -> Result<[f64; 2], TrainError> {
-    let share = |contact_ends| {
-        let reward = ChangedReward { paper: PseudoReward::default(), contact: 0.0, contact_ends };
+    let share = |contact| {
+        let reward = PseudoReward { contact, ..PseudoReward::default() };
         let scenario = scenario(task, conditions, reward);
         let judged = option_task(scenario, &task.states, task.seed.child("judge", 0));
         evaluate(&mut [judged], actor, EPISODES, &mut task.seed.stream("judge", 0))
     };
-    Ok([share(false)?.success_rate(), share(true)?.success_rate()])
+    Ok([share(0.0)?.success_rate(), share(-1.0)?.success_rate()])
 }
 
-fn scenario(task: &LearningTask<'_>, conditions: &Conditions, reward: ChangedReward) -> Scenario {
+fn scenario(task: &LearningTask<'_>, conditions: &Conditions, reward: PseudoReward) -> Scenario {
     Scenario {
         world: task.world.clone(),
         simulator: conditions.simulator.fork(),
@@ -220,25 +227,6 @@ fn scenario(task: &LearningTask<'_>, conditions: &Conditions, reward: ChangedRew
 /// Episodes of `scenario` that begin in `states`.
 fn option_task(scenario: Scenario, states: &Arc<InitialStates>, seed: Seed) -> OptionTask {
     OptionTask::new(Arc::new(SingleOption { scenario, states: Arc::clone(states) }), seed)
-}
-
-/// The paper's reward, and what a contact adds to it.
-#[derive(Clone, Copy, Debug)]
-struct ChangedReward {
-    paper: PseudoReward,
-    contact: f64,
-    contact_ends: bool,
-}
-
-impl Reward for ChangedReward {
-    fn reward(&self, transition: &Transition<'_>) -> f64 {
-        let contact = if transition.events.contact { self.contact } else { 0.0 };
-        self.paper.reward(transition) + contact
-    }
-
-    fn contact_ends(&self) -> bool {
-        self.contact_ends
-    }
 }
 
 /// Processor time of all threads of this process, seconds; NaN where Linux does not tell.

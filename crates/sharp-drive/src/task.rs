@@ -109,7 +109,7 @@ impl Environment for OptionTask {
         let running = self.running.as_mut().expect("reset comes before step");
         let outcome = running.step(action);
         running.observe(observation);
-        let terminated = outcome.success || outcome.collided;
+        let terminated = outcome.done || outcome.collided;
         Step { reward: outcome.reward as f32, terminated, truncated: outcome.late, success: outcome.success }
     }
 }
@@ -180,6 +180,8 @@ impl BatchEnvironment for DrivingBatch {
 struct ActionOutcome {
     reward: f64,
     /// The last option is done.
+    done: bool,
+    /// The same, and no contact on the way spoils it.
     success: bool,
     collided: bool,
     /// The horizon is used up, or the robot stands still where that ends episodes, and nothing else ended this one.
@@ -196,7 +198,7 @@ impl ActionOutcome {
         BatchStep {
             reward: self.reward as f32,
             failed,
-            terminated: failed || self.success,
+            terminated: failed || self.done,
             truncated: false,
             success: self.success,
             caution,
@@ -215,6 +217,8 @@ struct RunningTask {
     automaton: Automaton,
     /// `None` where standing still does not end episodes.
     standstill: Option<StandstillDetector>,
+    /// The robot has touched an obstacle.
+    has_touched: bool,
 }
 
 impl RunningTask {
@@ -234,7 +238,7 @@ impl RunningTask {
             automaton.observe(&world, &motion);
         }
         let standstill = scenario.ends_at_standstill.then(|| StandstillDetector::new(episode.state().pose));
-        Self { world, interface, reward, horizon_share, episode, automaton, standstill }
+        Self { world, interface, reward, horizon_share, episode, automaton, standstill, has_touched: false }
     }
 
     fn observe(&self, observation: &mut [f32]) {
@@ -267,6 +271,7 @@ impl RunningTask {
         let motion = self.episode.act(command);
         let before = *self.automaton.progress();
         self.automaton.observe(&self.world, &motion);
+        self.has_touched |= motion.contact;
         let collided = motion.contact && self.reward.contact_ends();
         let done = !collided && self.automaton.is_done();
         let reward = self.reward(&motion, &before, done);
@@ -275,9 +280,11 @@ impl RunningTask {
             standstill.stands_still()
         });
         let late = is_still || f64::from(self.automaton.actions()) >= self.horizon_actions();
+        let late = late && !done && !collided;
         // From here on the next option of the chain runs, if there is one.
-        let success = done && !self.automaton.advance();
-        ActionOutcome { reward, success, collided, late: late && !done && !collided }
+        let done = done && !self.automaton.advance();
+        let success = done && !(self.has_touched && self.reward.contact_fails());
+        ActionOutcome { reward, done, success, collided, late }
     }
 
     fn reward(&self, motion: &Motion, before: &GuideProgress, success: bool) -> f64 {

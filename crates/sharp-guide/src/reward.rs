@@ -33,6 +33,11 @@ pub trait Reward: Debug + Send + Sync {
     fn contact_ends(&self) -> bool {
         true
     }
+
+    /// Returns true if an episode of learning in which the robot touched an obstacle is no success, even where it goes on.
+    fn contact_fails(&self) -> bool {
+        self.contact_ends()
+    }
 }
 
 /// Where a pose lies as seen from an option: the three cases of definition 9.
@@ -46,7 +51,7 @@ pub enum Place {
     Allowed,
 }
 
-/// R of Definition 9.
+/// R of Definition 9, and what a contact costs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PseudoReward {
@@ -54,12 +59,15 @@ pub struct PseudoReward {
     pub success: f64,
     /// `r_p`, astray.
     pub stray: f64,
+    /// Added for each step in which the robot touched an obstacle. The paper has no such term; where there is one, an episode
+    /// with a contact is no success.
+    pub contact: f64,
 }
 
 impl Default for PseudoReward {
     /// The paper's values.
     fn default() -> Self {
-        Self { success: 1000.0, stray: -100.0 }
+        Self { success: 1000.0, stray: -100.0, contact: 0.0 }
     }
 }
 
@@ -80,17 +88,22 @@ impl PseudoReward {
 
 impl Reward for PseudoReward {
     fn reward(&self, transition: &Transition<'_>) -> f64 {
-        let StepEvents { success, stray, .. } = transition.events;
+        let StepEvents { success, stray, contact } = transition.events;
         let place = match (success, stray) {
             (true, _) => Place::Termination,
             (false, true) => Place::Astray,
             (false, false) => Place::Allowed,
         };
-        self.value(&transition.option.guide, transition.pose, place)
+        let contact = if contact { self.contact } else { 0.0 };
+        self.value(&transition.option.guide, transition.pose, place) + contact
     }
 
     fn contact_ends(&self) -> bool {
         false
+    }
+
+    fn contact_fails(&self) -> bool {
+        self.contact != 0.0
     }
 }
 

@@ -120,7 +120,7 @@ impl Settings {
         let mut method = Method::by_name(&self.learning).ok_or_else(|| {
             Raised::new(
                 "USAGE",
-                format!("learning is {:?}, expected fast, prior, paper or paper-success", self.learning),
+                format!("learning is {:?}, expected fast, prior, paper or paper-tuned", self.learning),
             )
         })?;
         if let Some(seconds) = self.failure_cost {

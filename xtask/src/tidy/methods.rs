@@ -9,7 +9,7 @@ const OWNER: &str = "crates/sharp-plan/src/method.rs";
 /// The crate in which `method` always means a `Method`.
 const CRATE: &str = "crates/sharp-plan/";
 /// The named methods. A library takes a method as an argument; only a command may choose one.
-const NAMED: [&str; 4] = ["Method::fast", "Method::paper", "Method::paper_until_success", "Method::prior"];
+const NAMED: [&str; 4] = ["Method::fast", "Method::paper", "Method::paper_tuned", "Method::prior"];
 
 /// Checks the code of all crates outside tests and examples.
 pub(super) fn check(tree: &Tree) -> Vec<Finding> {

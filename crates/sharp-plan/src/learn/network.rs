@@ -85,7 +85,7 @@ pub(crate) fn train_network(
     let policy = network_policy(training, &trained.actor);
     // What counts as a success is what it was trained for: in the paper a robot may touch a wall.
     let trial = task.monte_carlo(task.estimate_episodes, "certify", 0);
-    let trial = trial.with_contact_ends(training.reward.contact_ends());
+    let trial = trial.with_contact_ends(training.reward.contact_fails());
     let estimate = trial.estimate(&task.drivers(&policy)[..1], &task.states);
     let record = Training { stop: trained.stop, mean_return: trained.evaluation.mean_return, points };
     Ok(LearntPolicy {
@@ -109,7 +109,7 @@ fn training_point(
 ) -> TrainingPoint {
     let Evaluation { episodes, successes, mean_return, env_steps, .. } = *evaluation;
     let success = SuccessCount { episodes: episodes as u32, successes: successes as u32 };
-    let without_contact = if training.reward.contact_ends() {
+    let without_contact = if training.reward.contact_fails() {
         success
     } else {
         let policy = network_policy(training, actor);

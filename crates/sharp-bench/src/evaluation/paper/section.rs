@@ -41,7 +41,7 @@ pub(super) fn text(lines: &[&PaperLine]) -> String {
     text
 }
 
-/// What was measured of the paper's protocol, or of the one with another stop.
+/// What was measured of the paper's protocol, or of the one with a tuned learner.
 fn of_protocol(protocol: &Protocol, lines: &[&PaperLine], fast: &[&PaperLine]) -> String {
     let Protocol { method, titles, names } = protocol;
     let mut text = format!("\n### `--learning {method}`\n");
