@@ -1,10 +1,11 @@
 //! Our side of `cargo xtask bench peers option`: the longest option of a saved plan, learnt in several
 //! ways.
 //!
-//! `peer_option MAP PLAN paper SEED LIMIT` learns it by the paper's protocol, `scratch` in the guide's
-//! frame from fresh networks, both for at most `LIMIT` seconds; `fast SEED` does what the default mode
-//! does. Each prints one JSON object. `serve SEED` is the task that `paper` learns, for another
-//! program: see [`serve`]. Whoever learns is judged by the same rule, see [`judge`].
+//! `peer_option MAP PLAN paper SEED LIMIT` learns it by the paper's protocol, `tuned` by the same with a
+//! tuned learner, `scratch` in the guide's frame from fresh networks, each for at most `LIMIT` seconds;
+//! `fast SEED` does what the default mode does. Each prints one JSON object. `serve paper|tuned SEED` is
+//! the task that is learnt there, for another program: see [`serve`]. Whoever learns is judged by the
+//! same rule, see [`judge`].
 
 #![allow(
     clippy::disallowed_methods,
@@ -23,7 +24,7 @@ use sharp_drive::{
     prior_interface,
 };
 use sharp_guide::{GuidedOption, ProgressReward, PseudoReward, Reward, Role};
-use sharp_plan::{Conditions, LearningTask, Method, Plan};
+use sharp_plan::{Conditions, LearningTask, Method, Plan, TUNED_CONTACT};
 use sharp_rl::{
     Actor, Environment, Evaluation, StopRule, Stream, TrainError, TrainSettings, evaluate, train,
 };
@@ -32,6 +33,8 @@ use sharp_space::Seed;
 
 /// Success that counts as learnt, share of episodes.
 const WANTED: f64 = 0.95;
+/// The paper's stop: the mean return of a look.
+const STOP_RETURN: f64 = 500.0;
 /// Environment steps between two looks at the success.
 const JUDGE_EVERY: u64 = 1_000;
 /// Episodes of a look, and further ones where these suffice.
@@ -42,14 +45,20 @@ const STATES: usize = 256;
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> Outcome<()> {
-    let usage = "usage: peer_option MAP PLAN paper|scratch SEED LIMIT | fast SEED | serve SEED";
+    let usage =
+        "usage: peer_option MAP PLAN paper|tuned|scratch SEED LIMIT | fast SEED | serve paper|tuned SEED";
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [map, plan, rest @ ..] = &arguments[..] else { return Err(usage.into()) };
     let grid = sharp_maps::load(map, &sharp_maps::LoadOptions::default())?.grid;
     let peer = PeerTask::new(Plan::load(Path::new(plan), grid)?)?;
     let mut report = match rest.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["serve", seed] => return serve(peer.paper_task(Seed(seed.parse()?)), Seed(seed.parse()?)),
-        ["paper", seed, limit] => peer.paper(Seed(seed.parse()?), limit.parse()?)?,
+        ["serve", kind @ ("paper" | "tuned"), seed] => {
+            let seed = Seed(seed.parse()?);
+            return serve(peer.paper_task(kind == "tuned", seed), seed);
+        }
+        [kind @ ("paper" | "tuned"), seed, limit] => {
+            peer.paper(kind == "tuned", Seed(seed.parse()?), limit.parse()?)?
+        }
         ["scratch", seed, limit] => peer.scratch(Seed(seed.parse()?), limit.parse()?)?,
         ["fast", seed] => peer.fast(Seed(seed.parse()?))?,
         _ => return Err(usage.into()),
@@ -83,8 +92,8 @@ impl PeerTask {
         Ok(Self { option, next, states: Arc::new(states), conditions, plan })
     }
 
-    fn task(&self, interface: PolicyInterface, reward: Arc<dyn Reward>, seed: Seed) -> OptionTask {
-        let scenario = Scenario {
+    fn scenario(&self, interface: PolicyInterface, reward: Arc<dyn Reward>) -> Scenario {
+        Scenario {
             world: self.plan.world.clone(),
             simulator: self.conditions.simulator.fork(),
             noise: self.plan.noise.clone(),
@@ -94,28 +103,35 @@ impl PeerTask {
             horizon_share: 1.0,
             ends_at_standstill: false,
             start: RobotState::at_rest(self.option.guide.start()),
-        };
+        }
+    }
+
+    fn task(&self, scenario: Scenario, seed: Seed) -> OptionTask {
         OptionTask::new(Arc::new(SingleOption { scenario, states: Arc::clone(&self.states) }), seed)
     }
 
-    /// The paper's observation, action and reward.
-    fn paper_task(&self, seed: Seed) -> OptionTask {
+    /// The paper's observation, action, reward and simulator; `is_tuned`, with what the tuned mode changes of them.
+    fn paper_task(&self, is_tuned: bool, seed: Seed) -> OptionTask {
         let interface = PolicyInterface::Absolute { reach_m: self.plan.world.robot.waypoint_reach_m };
-        self.task(interface, Arc::new(PseudoReward::default()), seed)
+        let paper = PseudoReward::default();
+        let reward = if is_tuned { PseudoReward { contact: TUNED_CONTACT, ..paper } } else { paper };
+        let scenario = self.scenario(interface, Arc::new(reward));
+        let simulator = self.plan.world.simulator(Method::paper().simulator);
+        self.task(Scenario { simulator, ends_at_standstill: is_tuned, ..scenario }, seed)
     }
 
-    fn paper(&self, seed: Seed, limit_s: f64) -> Result<Value, TrainError> {
-        let tasks = vec![self.paper_task(seed.child("environment", 0))];
-        let settings = TrainSettings::default();
-        learn(tasks, self.paper_task(seed.child("judge", 0)), settings, seed, limit_s)
+    fn paper(&self, is_tuned: bool, seed: Seed, limit_s: f64) -> Result<Value, TrainError> {
+        let task = |name| self.paper_task(is_tuned, seed.child(name, 0));
+        let settings = if is_tuned { TrainSettings::absolute() } else { TrainSettings::default() };
+        learn(vec![task("environment")], task("judge"), settings, seed, limit_s)
     }
 
     /// A correction in the guide's frame, learnt on this option alone.
     fn scratch(&self, seed: Seed, limit_s: f64) -> Result<Value, TrainError> {
         let Plan { world, noise, .. } = &self.plan;
         let interface = prior_interface(&world.robot, PolicyContext::new(noise, 1.0));
-        let task =
-            |name, index| self.task(interface, Arc::new(ProgressReward::default()), seed.child(name, index));
+        let scenario = self.scenario(interface, Arc::new(ProgressReward::default()));
+        let task = |name, index| self.task(scenario.clone(), seed.child(name, index));
         let tasks = (0..16).map(|index| task("environment", index)).collect();
         let settings = TrainSettings::fast().with(|train| train.sac.zero_last_actor_layer = true);
         learn(tasks, task("judge", 0), settings, seed, limit_s)
@@ -159,6 +175,7 @@ fn learn(
     });
     let (mut judged, mut judge_rng) = ([judged], seed.stream("judge", 0));
     let (mut looks, mut due, mut effort) = (Vec::new(), JUDGE_EVERY, (0, 0));
+    let mut stop = Value::Null;
     let mut failure = None;
     let clock = Clock::start();
     train(&mut tasks, &settings, &mut seed.stream("sac", 0), &mut |progress| {
@@ -166,7 +183,12 @@ fn learn(
         if effort.0 >= due {
             due += JUDGE_EVERY;
             match judge(&mut judged, progress.actor, &mut judge_rng) {
-                Ok(rate) => looks.push((effort.0, rate)),
+                Ok((rate, mean_return)) => {
+                    looks.push((effort.0, rate));
+                    if stop.is_null() && mean_return >= STOP_RETURN {
+                        stop = clock.spent(effort.0);
+                    }
+                }
                 Err(error) => failure = Some(error),
             }
         }
@@ -176,19 +198,23 @@ fn learn(
     })?;
     failure.map_or(Ok(()), Err)?;
     let best = looks.iter().map(|look| look.1).fold(0.0, f64::max);
-    Ok(clock.report(best >= WANTED, best, effort, &looks))
+    let mut report = clock.report(best >= WANTED, best, effort, &looks);
+    report["stop"] = stop;
+    Ok(report)
 }
 
-/// The success rate of the most likely actions: over the first episodes where it is too low, and
+/// The success rate and the mean return of the most likely actions: over the first episodes where it is too low, and
 /// otherwise over many fresh ones, because the best of many short looks is lucky.
-fn judge(task: &mut [OptionTask], actor: &Actor, rng: &mut Stream) -> Result<f64, TrainError> {
+fn judge(task: &mut [OptionTask], actor: &Actor, rng: &mut Stream) -> Result<(f64, f64), TrainError> {
     let [few, many] = EPISODES;
-    let first = evaluate(task, actor, few, rng)?.success_rate();
-    if first < WANTED {
-        return Ok(first);
+    let first = evaluate(task, actor, few, rng)?;
+    let (rate, mean_return) = (first.success_rate(), first.mean_return);
+    if rate < WANTED {
+        return Ok((rate, mean_return));
     }
     // A policy that succeeded at first is worth no more than what it does then.
-    evaluate(task, actor, many, rng).map(|second: Evaluation| second.success_rate().min(first))
+    let second: Evaluation = evaluate(task, actor, many, rng)?;
+    Ok((second.success_rate().min(rate), mean_return))
 }
 
 /// Time since the beginning, by the wall and by the processor.
@@ -204,6 +230,11 @@ impl Clock {
 
     fn seconds(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()
+    }
+
+    /// What it took to come here.
+    fn spent(&self, steps: u64) -> Value {
+        json!({"seconds": self.seconds(), "cpu_seconds": cpu_seconds() - self.cpu_s, "steps": steps})
     }
 
     /// The JSON object on stdout; `looks` are pairs of steps and success.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sharp_drive::FAILURE_COST_S;
 use sharp_guide::{GuidePlanner, GuideSettings, PlannerKind, PseudoReward};
 use sharp_options::AllowedRule;
-use sharp_rl::{Normalisation, SacSettings, StopRule, TrainSettings};
+use sharp_rl::TrainSettings;
 use sharp_sim::SimulatorKind;
 
 use crate::learn::{OptionLearner, PaperProtocol, PriorOnly, Selection};
@@ -20,17 +20,14 @@ const RETRY_ABOVE: f64 = 1.1;
 /// How fast legs without a guide are thought to be driven where an answer is wanted at once, as a share of the top speed.
 const UNGUIDED_SPEED: f64 = 0.6;
 
-/// How fast the policies drive that the paper's protocol learns, as a share of the top speed: 0.6 to 0.94 on 17 legs of `a`
+/// How fast the policies drive that the paper's protocol learns, as a share of the top speed: 0.61 to 0.94 on 21 legs of `a`
 /// that are longer than a metre, both robots. At a lower speed of what is not learnt yet the search would take what it knows
 /// for the sake of an error, at a higher one it would shun it.
 const LEARNT_SPEED: f64 = 0.7;
 
-/// The stop of [`Method::paper_tuned`]: success without contact, share of episodes, and the fresh episodes that confirm it.
-const SUCCESS_WANTED: f64 = 0.97;
-const SUCCESS_EPISODES: usize = 500;
-/// What its reward adds for a step with a contact. With -50, or where a contact ended the episode, robots that begin in a tight
+/// What the reward of [`Method::paper_tuned`] adds for a step with a contact. With -50, or where a contact ended the episode, robots that begin in a tight
 /// place learnt to stay there.
-const TUNED_CONTACT: f64 = -10.0;
+pub const TUNED_CONTACT: f64 = -10.0;
 
 /// How a problem is solved.
 #[derive(Clone, Debug)]
@@ -231,14 +228,15 @@ impl Method {
         .with_guides(guide)
     }
 
-    /// The paper's protocol with a learner that was tuned for it (docs/algorithms/sac.md): the same
+    /// The paper's protocol with a learner that was tuned for it ([`TrainSettings::absolute`], docs/algorithms/sac.md): the same
     /// options, guides, observations and actions, each learnt from nothing. A contact costs something, and an episode ends
     /// when the robot stands still, because a robot that is wedged in learns nothing from the rest of it.
     #[must_use]
     pub fn paper_tuned() -> Self {
         let reward = PseudoReward { contact: TUNED_CONTACT, ..PseudoReward::default() };
-        let protocol =
-            PaperProtocol::new(tuned_training()).ending_at_standstill().with_reward(Arc::new(reward));
+        let protocol = PaperProtocol::new(TrainSettings::absolute())
+            .ending_at_standstill()
+            .with_reward(Arc::new(reward));
         Self { order: LearningOrder::Chained, ..Self::paper() }
             .with_learner("paper-tuned", Arc::new(protocol))
     }
@@ -332,26 +330,6 @@ impl Method {
         let repair = RepairSettings { episodes: repair, ..self.repair };
         Self { estimate_episodes: estimate, verify_episodes: verify, repair, ..self }
     }
-}
-
-/// Soft actor-critic for options that are learnt from nothing in absolute coordinates, with rewards of hundreds: both are
-/// scaled to the size of one, the networks are small, and their steps are large.
-fn tuned_training() -> TrainSettings {
-    TrainSettings::default().with(|train| {
-        train.sac = SacSettings::default().with(|sac| {
-            sac.hidden = vec![64, 64];
-            sac.batch = 128;
-            sac.gamma = 0.97;
-            sac.tau = 0.01;
-            sac.learning_rate = 1e-3;
-            sac.reward_scale = 0.01;
-        });
-        train.normalisation = Normalisation::FromWarmup;
-        train.max_env_steps = 100_000;
-        train.evaluate_every = 5_000;
-        train.evaluation_episodes = 100;
-        train.stop = StopRule::Success { rate: SUCCESS_WANTED, episodes: SUCCESS_EPISODES };
-    })
 }
 
 #[cfg(test)]

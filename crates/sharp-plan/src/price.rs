@@ -104,7 +104,7 @@ impl<'a> Pricer<'a> {
     /// The cost of a leg in seconds where `measured` is known of it beside its `price`.
     ///
     /// The price of the model counts as so many episodes more: it knows little of rare failures, and so do a hundred episodes.
-    /// The paper's rule knows no price of a failure: its cost of a learnt option is the mean number of steps (Sec. 4.3).
+    /// The paper's rule knows no price of a failure: its cost of a learnt option is the mean number of steps (line 17).
     pub(crate) fn cost_s(&self, price: &Price, measured: Option<&SuccessEstimate>) -> f64 {
         let Price { time_s, success } = *price;
         let Some(SuccessEstimate { count, mean_time_s }) = measured else {

@@ -82,6 +82,28 @@ impl TrainSettings {
         }
     }
 
+    /// For policies that are learnt from nothing in coordinates of a map, with rewards of hundreds: both are scaled to the
+    /// size of one, the networks are small, and their steps are large. A stop at 97 % success, confirmed on 500 episodes.
+    #[must_use]
+    pub fn absolute() -> Self {
+        Self {
+            sac: SacSettings::default().with(|sac| {
+                sac.hidden = vec![64, 64];
+                sac.batch = 128;
+                sac.gamma = 0.97;
+                sac.tau = 0.01;
+                sac.learning_rate = 1e-3;
+                sac.reward_scale = 0.01;
+            }),
+            normalisation: Normalisation::FromWarmup,
+            max_env_steps: 100_000,
+            evaluate_every: 5_000,
+            evaluation_episodes: 100,
+            stop: StopRule::Success { rate: 0.97, episodes: 500 },
+            ..Self::default()
+        }
+    }
+
     /// The same settings after `change`.
     #[must_use]
     pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
