@@ -113,7 +113,7 @@ impl PaperSite {
         };
         let mut line = self.line(row, &report, spent, &args);
         line["reuse"] = report["reuse"].clone();
-        if row.word("method") == "paper" {
+        if row.word("method").starts_with("paper") {
             line["legs"] = legs(&report);
         }
         if report["status"] == "solved" {

@@ -27,7 +27,7 @@ const LEARNT_SPEED: f64 = 0.7;
 
 /// What the reward of [`Method::paper_tuned`] adds for a step with a contact. With -50, or where a contact ended the episode, robots that begin in a tight
 /// place learnt to stay there.
-pub const TUNED_CONTACT: f64 = -10.0;
+pub const TUNED_CONTACT: f64 = -3.0;
 
 /// How a problem is solved.
 #[derive(Clone, Debug)]

@@ -86,10 +86,8 @@ fn learn_chained(
         if policies.get(option.id).is_none() {
             let states = initial_states(problem, option, seed).with_arrivals(arrivals.clone());
             let task = LearningTask { next, ..task(problem, option, states, seed) };
-            let monitor = OptionMonitor { monitor: problem.monitor, option, file: None };
-            let result = problem.method.learner.learn(&task, &monitor);
-            announce(problem, option, &result);
-            if !take(problem, option, result, search, policies)? {
+            let lesson = learn(problem, &task, policies.trainings());
+            if !take(problem, option, lesson, search, policies)? {
                 return Ok(false);
             }
         }
@@ -107,28 +105,34 @@ fn learn_independent(
     search: &Search<'_>,
     policies: &mut Policies<'_>,
 ) -> Result<bool, FileError> {
-    let folder = policies.trainings().map(Path::to_owned);
-    let learn = |option: &Arc<GuidedOption>| {
+    let folder = policies.trainings();
+    let learn_alone = |option: &Arc<GuidedOption>| {
         let seed = option_seed(problem, option);
-        let file = folder
-            .as_deref()
-            .map(|folder| TrainingFile::new(folder, option.id, &decides_training(problem, option, seed)));
-        let result = learn_or_find(problem, option, seed, file.as_ref());
-        announce(problem, option, &result);
+        let task = task(problem, option, initial_states(problem, option, seed), seed);
         // The others go on: what can be learnt is learnt.
-        (result, file)
+        learn(problem, &task, folder)
     };
+    let lessons = side_by_side(missing, learn_alone);
     let mut finished = true;
-    for (option, (result, file)) in missing.iter().zip(side_by_side(missing, learn)) {
-        let is_learnt = take(problem, option, result, search, policies)?;
-        finished &= is_learnt;
-        let Some(file) = file else { continue };
-        if is_learnt {
-            policies.note_training(option.id, file.path());
-        }
-        file.into_failure().map_or(Ok(()), Err)?;
+    for (option, lesson) in missing.iter().zip(lessons) {
+        finished &= take(problem, option, lesson, search, policies)?;
     }
     Ok(finished)
+}
+
+/// What came of a task, and the file of its training where trainings are kept.
+type Lesson = (Result<LearntPolicy, LearnFailure>, Option<TrainingFile>);
+
+/// Learns what `task` asks for, unless the `folder` of trainings has it, and tells the monitor.
+fn learn(problem: &PlanningProblem<'_>, task: &LearningTask<'_>, folder: Option<&Path>) -> Lesson {
+    let new_file =
+        |folder| TrainingFile::new(folder, task.option.id, &decides_training(problem, task));
+    let file = folder.map(new_file);
+    let result = learn_or_find(problem, task, file.as_ref());
+    if let Ok(learnt) = &result {
+        problem.monitor.learnt(task.option, learnt);
+    }
+    (result, file)
 }
 
 /// Does `learn` with each of `options` on as many threads as there are; what comes first on a long list are the longest
@@ -158,11 +162,10 @@ fn side_by_side<R: Send>(
     results.into_iter().map(|result| done(result).expect("every option had its turn")).collect()
 }
 
-/// Learns `option`, unless `file` has what an interrupted solve learnt.
+/// Learns what `task` asks for, unless `file` has what an interrupted solve learnt.
 fn learn_or_find(
     problem: &PlanningProblem<'_>,
-    option: &Arc<GuidedOption>,
-    seed: Seed,
+    task: &LearningTask<'_>,
     file: Option<&TrainingFile>,
 ) -> Result<LearntPolicy, LearnFailure> {
     let found = file.map_or(Ok(None), TrainingFile::finished).map_err(LearnFailure::File)?;
@@ -172,50 +175,44 @@ fn learn_or_find(
     if problem.monitor.should_stop() {
         return Err(LearnFailure::Stopped);
     }
-    let task = task(problem, option, initial_states(problem, option, seed), seed);
-    let monitor = OptionMonitor { monitor: problem.monitor, option, file };
-    let learnt = problem.method.learner.learn(&task, &monitor)?;
+    let monitor = OptionMonitor { monitor: problem.monitor, option: task.option, file };
+    let learnt = problem.method.learner.learn(task, &monitor)?;
     file.map_or(Ok(()), |file| file.finish(&learnt)).map_err(LearnFailure::File)?;
     Ok(learnt)
 }
 
-/// A text of everything that decides the training of `option`, apart from map and simulator.
-fn decides_training(problem: &PlanningProblem<'_>, option: &GuidedOption, seed: Seed) -> String {
-    let PlanningProblem { world, method, conditions, query, .. } = problem;
-    let start = (option.id.role() == Role::First).then_some(query.start);
-    let corridor = corridor(option, &world.grid);
+/// A text of everything that decides the training of `task`, apart from map and simulator.
+fn decides_training(problem: &PlanningProblem<'_>, task: &LearningTask<'_>) -> String {
+    let PlanningProblem { world, method, conditions, .. } = problem;
+    let LearningTask { option, next, states, seed, .. } = task;
+    let corridors = [Some(*option), *next].map(|option| option.map(|option| corridor(option, &world.grid)));
     let (learner, episodes) = (&method.learner, method.estimate_episodes);
-    format!("{:?} {:?} {corridor} {start:?} {seed:?} {learner:?} {episodes}", world.robot, conditions.noise)
-}
-
-/// Tells the monitor what was learnt of `option`.
-fn announce(
-    problem: &PlanningProblem<'_>,
-    option: &Arc<GuidedOption>,
-    result: &Result<LearntPolicy, LearnFailure>,
-) {
-    if let Ok(learnt) = result {
-        problem.monitor.learnt(option, learnt);
-    }
+    format!("{:?} {:?} {corridors:?} {states:?} {seed:?} {learner:?} {episodes}", world.robot, conditions.noise)
 }
 
 /// Keeps what was learnt of `option`; false if learning was stopped.
 fn take(
     problem: &PlanningProblem<'_>,
     option: &Arc<GuidedOption>,
-    result: Result<LearntPolicy, LearnFailure>,
+    (result, file): Lesson,
     search: &Search<'_>,
     policies: &mut Policies<'_>,
 ) -> Result<bool, FileError> {
     let learnt = match result {
         Ok(learnt) => learnt,
-        Err(LearnFailure::Stopped) => return Ok(false),
+        Err(LearnFailure::Stopped) => {
+            return file.and_then(TrainingFile::into_failure).map_or(Ok(false), Err);
+        }
         // A broken task cannot be learnt: its edge goes, the search goes on.
         Err(LearnFailure::File(error)) => return Err(error),
         Err(LearnFailure::Broken(_)) => LearntPolicy::useless(&problem.world.robot),
     };
     // The option of a plan may have been joined to its neighbours; the library keeps it as it is alone.
     policies.keep(search.option(option.id).unwrap_or(option), learnt, &problem.world.grid)?;
+    if let Some(file) = file {
+        policies.note_training(option.id, file.path());
+        file.into_failure().map_or(Ok(()), Err)?;
+    }
     Ok(true)
 }
 
