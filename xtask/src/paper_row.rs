@@ -77,9 +77,22 @@ impl NamedRow<'_> {
 }
 
 impl PaperSite {
-    /// Whether the library of the problems before `row` is there.
-    pub(crate) fn has_library(&self, row: &NamedRow<'_>) -> bool {
-        !row.is_of_sharp() || row.problem() == 1 || self.library(row).exists()
+    /// Whether the library has what `row` learnt.
+    pub(crate) fn has_learnt(&self, row: &NamedRow<'_>) -> bool {
+        self.library(row).exists() && self.mark(row).exists()
+    }
+
+    /// Notes that the line of `row` is kept.
+    ///
+    /// # Errors
+    /// If that cannot be written.
+    pub(crate) fn note(&self, row: &NamedRow<'_>) -> anyhow::Result<()> {
+        let mark = self.mark(row);
+        fs::write(&mark, "").with_context(|| format!("cannot write {}", mark.display()))
+    }
+
+    fn mark(&self, row: &NamedRow<'_>) -> PathBuf {
+        self.out.join("rows").join(row.name()).join("measured")
     }
 
     fn library(&self, row: &NamedRow<'_>) -> PathBuf {

@@ -5,7 +5,6 @@
 //! measures what has no line yet.
 
 use std::fs;
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -39,9 +38,9 @@ pub(crate) fn run(args: &[String]) -> anyhow::Result<u8> {
         return table.trial(&rows, name);
     }
     let only = flag(args, "--only").unwrap_or_default();
-    let chosen: Vec<&Value> = rows.iter().filter(|row| NamedRow(row).name().contains(only)).collect();
-    ensure!(!chosen.is_empty(), "no row's name holds {only:?}; one is {}", NamedRow(&rows[0]).name());
-    let code = table.measure_missing(&chosen)?;
+    let is_chosen = |row: &Value| NamedRow(row).name().contains(only);
+    ensure!(rows.iter().any(is_chosen), "no row's name holds {only:?}; one is {}", NamedRow(&rows[0]).name());
+    let code = table.measure_missing(&rows, &is_chosen)?;
     table.write()?;
     Ok(code)
 }
@@ -91,16 +90,10 @@ impl PaperTable {
         text.lines().map(|line| serde_json::from_str(line).context("paper_table prints no rows")).collect()
     }
 
-    /// Measures those of `rows` that have no line yet, while there is time; 3 if some are left.
-    fn measure_missing(&self, rows: &[&Value]) -> anyhow::Result<u8> {
+    /// Measures the chosen ones of `rows` that have no line yet, while there is time; 3 if some are left.
+    fn measure_missing(&self, rows: &[Value], is_chosen: &dyn Fn(&Value) -> bool) -> anyhow::Result<u8> {
         let known: Vec<String> = read_lines()?.iter().map(|line| NamedRow(line).name()).collect();
-        let missing = missing(rows, &known, |row| self.site.has_library(row));
-        let again: Vec<String> =
-            missing.iter().map(|row| NamedRow(row).name()).filter(|name| known.contains(name)).collect();
-        if !again.is_empty() {
-            eprintln!("their library is gone, so they are measured again: {}", again.join(", "));
-            remove_lines(&again)?;
-        }
+        let missing = missing(rows, is_chosen, &known, |row| self.site.has_learnt(row));
         let mut left = missing.len();
         for together in missing.chunk_by(|a, b| are_measured_together(a, b)) {
             let remaining_s = self.site.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
@@ -119,7 +112,8 @@ impl PaperTable {
             });
             for result in results {
                 let Some(line) = result? else { continue };
-                append(&line)?;
+                keep(&line)?;
+                self.site.note(&NamedRow(&line))?;
                 eprintln!("{}", summary(&line));
                 left -= 1;
             }
@@ -163,20 +157,20 @@ impl PaperTable {
     }
 }
 
-/// The `rows` that are not `known`. Where the library of the problems before is gone they are measured once more, because a
-/// problem without what they learnt is another one.
+/// The chosen ones of `rows` that are to be measured: of a chain of problems with one library that is not `known` to the end,
+/// all whose policies the library has not got, in order. A problem without what those before it learnt is another one, so a
+/// chain ends before a row that is not chosen, and begins anew where its library is gone.
 fn missing<'a>(
-    rows: &[&'a Value],
+    rows: &'a [Value],
+    is_chosen: &dyn Fn(&Value) -> bool,
     known: &[String],
-    has_library: impl Fn(&NamedRow<'_>) -> bool,
+    has_learnt: impl Fn(&NamedRow<'_>) -> bool,
 ) -> Vec<&'a Value> {
-    let is_known = |row: &&Value| known.contains(&NamedRow(row).name());
-    let is_same = |a: &&Value, b: &&Value| NamedRow(a).group() == NamedRow(b).group();
-    let of_chain = |chain: &[&'a Value]| {
-        let done = chain.iter().take_while(|row| is_known(row)).count();
-        let begins_anew = chain.get(done).is_some_and(|row| !has_library(&NamedRow(row)));
-        let skipped = if begins_anew { 0 } else { done };
-        chain[skipped..].iter().copied().filter(|row| begins_anew || !is_known(row)).collect::<Vec<_>>()
+    let is_same = |a: &Value, b: &Value| NamedRow(a).group() == NamedRow(b).group();
+    let of_chain = |chain: &'a [Value]| {
+        let is_whole = chain.iter().all(|row| known.contains(&NamedRow(row).name()));
+        let left = chain.iter().skip_while(|row| has_learnt(&NamedRow(row)));
+        left.take_while(|row| !is_whole && is_chosen(row)).collect::<Vec<_>>()
     };
     rows.chunk_by(is_same).flat_map(of_chain).collect()
 }
@@ -202,20 +196,17 @@ fn read_lines() -> anyhow::Result<Vec<Value>> {
     text.lines().enumerate().map(parse).collect()
 }
 
-fn append(line: &Value) -> anyhow::Result<()> {
-    let mut file = fs::OpenOptions::new().append(true).open(root().join(LINES));
-    let written = file.as_mut().map_err(|error| error.to_string()).and_then(|file| {
-        writeln!(file, "{line}").and_then(|()| file.sync_all()).map_err(|error| error.to_string())
-    });
-    written.map_err(|error| anyhow::anyhow!("cannot append to {LINES}: {error}"))
-}
-
-/// Removes the lines of the rows called `names`.
-fn remove_lines(names: &[String]) -> anyhow::Result<()> {
-    let kept = read_lines()?.into_iter().filter(|line| !names.contains(&NamedRow(line).name()));
-    let text: String = kept.map(|line| format!("{line}\n")).collect();
+/// Puts `line` behind the others, in place of an older one of its row.
+fn keep(line: &Value) -> anyhow::Result<()> {
+    let folder = root().join(OUT);
+    // Another call may do the same.
+    let lock = fs::File::create(folder.join("lock")).and_then(|file| file.lock().map(|()| file));
+    let _lock = lock.with_context(|| format!("cannot lock {OUT}"))?;
+    let name = NamedRow(line).name();
+    let others = read_lines()?.into_iter().filter(|other| NamedRow(other).name() != name);
+    let text: String = others.chain([line.clone()]).map(|line| format!("{line}\n")).collect();
     // A kill must not leave half a file: the lines took hours.
-    let fresh = root().join(OUT).join("lines.jsonl");
+    let fresh = folder.join("lines.jsonl");
     let written = fs::write(&fresh, text).and_then(|()| fs::rename(&fresh, root().join(LINES)));
     written.with_context(|| format!("cannot write {LINES}"))
 }
@@ -275,20 +266,20 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_without_its_library_begins_anew() {
+    fn a_chain_goes_on_with_its_library_and_begins_anew_without() {
         let row = |env: &str, problem: u32| json!({"method": "paper", "env": env, "robot": "limo", "options": "centroid", "problem": problem});
         let rows = [row("a", 1), row("a", 2), row("a", 3), row("b", 1), row("b", 2)];
-        let rows: Vec<&Value> = rows.iter().collect();
-        let known: Vec<String> = [rows[0], rows[1], rows[3]].map(|row| NamedRow(row).name()).into();
-        let left = |has_library: &dyn Fn(&NamedRow<'_>) -> bool| -> Vec<String> {
-            missing(&rows, &known, has_library).iter().map(|row| NamedRow(row).name()).collect()
+        let known = [0, 1, 3, 4].map(|index: usize| NamedRow(&rows[index]).name());
+        let left = |chosen: &str, learnt: &[u64]| -> Vec<u64> {
+            let is_chosen = |row: &Value| NamedRow(row).name().contains(chosen);
+            let rows = missing(&rows, &is_chosen, &known, |row| learnt.contains(&row.problem()));
+            rows.iter().map(|row| NamedRow(row).problem()).collect()
         };
-        assert_eq!(
-            left(&|_| true),
-            ["a-limo-centroid-p3", "b-limo-centroid-p2"].map(|name| format!("paper-{name}"))
-        );
-        let of_a = left(&|row| row.problem() == 1 || row.word("env") == "b");
-        assert_eq!(of_a.len(), 4, "all of a and the rest of b: {of_a:?}");
+        assert_eq!(left("", &[1, 2]), [3], "and nothing of b, which is whole");
+        assert_eq!(left("", &[]), [1, 2, 3], "the library is gone");
+        assert_eq!(left("", &[1]), [2, 3], "problem 2 is known from another library");
+        assert_eq!(left("p3", &[1, 2]), [3]);
+        assert!(left("p3", &[]).is_empty(), "problem 3 needs what 1 and 2 learnt");
     }
 
     #[test]

@@ -16,7 +16,8 @@
 //! * `starts=centre`: episodes begin at rest where the guide does, not spread over the initiation set.
 //! * `scale=0.01`: rewards are multiplied inside the algorithm; the task stays the same.
 //! * `normalise=true`: observations are normalised by those of the warm-up.
-//! * `hidden=64`, `batch=128`, `rate=1e-3`: units in each hidden layer, transitions in a gradient step, and its size.
+//! * `hidden=64`, `batch=128`, `rate=1e-3`, `gamma=0.97`, `tau=0.01`, `nstep=3`, `warmup=1000`, `alpha=0.05`, `updates=0.5`:
+//!   units of each hidden layer, transitions of a gradient step, learning rate, and the other settings of `SacSettings`.
 //! * `until=free`: training goes on until the share of 0.95 succeeds without contact.
 //! * `steps=60000`, `seed=1`: the budget, and the root of all randomness.
 

@@ -1,6 +1,6 @@
 //! Which pictures belong to a result, and where they go.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use sharp_draw::{Scene, Trajectory, svg_to_png};
 use sharp_drive::EpisodeEnd;
@@ -13,6 +13,9 @@ use crate::error::BenchError;
 /// Longer side of the PNG beside each SVG, pixels.
 const PNG_SIDE_PX: u32 = 1200;
 
+/// Of every picture.
+const EXTENSIONS: [&str; 2] = ["svg", "png"];
+
 /// Writes `svg` as `NAME.svg` and `NAME.png` into `folder`.
 ///
 /// # Errors
@@ -23,8 +26,8 @@ pub fn write(folder: &Path, name: &str, svg: &str) -> Result<(), BenchError> {
     Ok(())
 }
 
-/// The same of a picture that `draw`s the same every time: it is taken from `kept`, a path without extension, if it is
-/// there, and kept there otherwise. A folder that cannot be written keeps nothing.
+/// Like [`write`], for a picture that never changes: it is taken from `kept`, a path without extension, if it is there, and
+/// kept there otherwise. A folder that cannot be written keeps nothing.
 ///
 /// # Errors
 /// As [`write`].
@@ -34,22 +37,26 @@ pub fn write_kept(
     kept: Option<&Path>,
     draw: &dyn Fn() -> String,
 ) -> Result<(), BenchError> {
-    let files = ["svg", "png"].map(|extension| {
-        let kept = kept.map(|path| path.with_extension(extension));
-        (kept, folder.join(format!("{name}.{extension}")))
-    });
-    let read = |(kept, _): &(Option<PathBuf>, PathBuf)| std::fs::read(kept.as_ref()?).ok();
-    if let [Some(svg), Some(png)] = files.each_ref().map(read) {
-        write_atomic(&files[0].1, &svg)?;
-        write_atomic(&files[1].1, &png)?;
+    let paths = |path: &Path| EXTENSIONS.map(|extension| path.with_extension(extension));
+    let new = paths(&folder.join(name));
+    let Some(kept) = kept.map(paths) else { return write(folder, name, &draw()) };
+    if let [Ok(svg), Ok(png)] = kept.each_ref().map(std::fs::read) {
+        write_atomic(&new[0], &svg)?;
+        write_atomic(&new[1], &png)?;
         return Ok(());
     }
     write(folder, name, &draw())?;
-    for (kept, path) in files {
-        let Some(kept) = kept else { continue };
-        let _ = std::fs::read(path).map(|bytes| write_atomic(&kept, &bytes));
+    for (kept, new) in kept.iter().zip(&new) {
+        let _ = std::fs::read(new).map(|bytes| write_atomic(kept, &bytes));
     }
     Ok(())
+}
+
+/// Removes the picture that [`write_kept`] kept at `kept`, if it can be removed.
+pub fn forget(kept: &Path) {
+    for path in EXTENSIONS.map(|extension| kept.with_extension(extension)) {
+        let _ = std::fs::remove_file(path);
+    }
 }
 
 /// How critical each cell is, 0 to 1, with the outlines of the regions made from it.
@@ -128,4 +135,29 @@ fn guides(plans: &[&Plan], query: &Query, executions: &[Execution]) -> String {
         .trajectories(&trajectories, plan.world.robot.footprint)
         .problem(query.start, query.goal)
         .to_svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_that_is_kept_is_not_drawn_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let kept = folder.path().join("library/states");
+        let svg = |width: u32| {
+            format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"2\"/>")
+        };
+        let drawn = |width, kept: &Path| {
+            let new = folder.path().join("plan");
+            write_kept(&new, "states", Some(kept), &|| svg(width)).expect("a picture");
+            std::fs::read_to_string(new.join("states.svg")).expect("a picture")
+        };
+        assert_eq!(drawn(3, &kept), svg(3));
+        assert_eq!(drawn(4, &kept), svg(3), "the kept one");
+        forget(&kept);
+        assert_eq!(drawn(4, &kept), svg(4));
+        let file = folder.path().join("plan/states.svg/no folder");
+        assert_eq!(drawn(5, &file), svg(5), "where nothing can be kept");
+    }
 }

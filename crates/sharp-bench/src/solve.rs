@@ -175,6 +175,8 @@ pub fn prepare(
     }
     let file = sharp.abstraction_file(monitor)?;
     if let Some(path) = path {
+        // A picture beside it would be of an older abstraction.
+        pictures::forget(&path.with_extension(""));
         file.save(&path)?;
     }
     Ok((sharp, file))
@@ -287,7 +289,6 @@ impl Solved {
         plan.save(folder, file)?;
         let grid = &plan.world.grid;
         sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
-        // They take as long as the answer.
         let (of_states, of_plan) = rayon::join(
             || {
                 pictures::write_kept(folder, "abstraction", picture.as_deref(), &|| {

@@ -33,6 +33,8 @@ use sharp_space::Seed;
 
 /// Success that counts as learnt, share of episodes.
 const WANTED: f64 = 0.95;
+/// The budget of a side, as in the paper.
+const MAX_STEPS: u64 = 150_000;
 /// The paper's stop: the mean return of a look.
 const STOP_RETURN: f64 = 500.0;
 /// Environment steps between two looks at the success.
@@ -171,6 +173,7 @@ fn learn(
     let settings = settings.with(|train| {
         train.evaluate_every = u64::MAX / 2;
         train.evaluation_episodes = 1;
+        train.max_env_steps = MAX_STEPS;
         train.stop = StopRule::Never;
     });
     let (mut judged, mut judge_rng) = ([judged], seed.stream("judge", 0));
@@ -182,13 +185,13 @@ fn learn(
         effort = (progress.env_steps, progress.updates);
         if effort.0 >= due {
             due += JUDGE_EVERY;
-            match judge(&mut judged, progress.actor, &mut judge_rng) {
-                Ok((rate, mean_return)) => {
-                    looks.push((effort.0, rate));
-                    if stop.is_null() && mean_return >= STOP_RETURN {
-                        stop = clock.spent(effort.0);
-                    }
+            let mut at_first = |first: &Evaluation| {
+                if stop.is_null() && first.mean_return >= STOP_RETURN {
+                    stop = clock.spent(effort.0);
                 }
+            };
+            match judge(&mut judged, progress.actor, &mut judge_rng, &mut at_first) {
+                Ok(rate) => looks.push((effort.0, rate)),
                 Err(error) => failure = Some(error),
             }
         }
@@ -203,18 +206,24 @@ fn learn(
     Ok(report)
 }
 
-/// The success rate and the mean return of the most likely actions: over the first episodes where it is too low, and
-/// otherwise over many fresh ones, because the best of many short looks is lucky.
-fn judge(task: &mut [OptionTask], actor: &Actor, rng: &mut Stream) -> Result<(f64, f64), TrainError> {
+/// The success rate of the most likely actions: over the first episodes where it is too low, and
+/// otherwise over many fresh ones, because the best of many short looks is lucky. `at_first` is told
+/// what the first ones gave.
+fn judge(
+    task: &mut [OptionTask],
+    actor: &Actor,
+    rng: &mut Stream,
+    at_first: &mut dyn FnMut(&Evaluation),
+) -> Result<f64, TrainError> {
     let [few, many] = EPISODES;
     let first = evaluate(task, actor, few, rng)?;
-    let (rate, mean_return) = (first.success_rate(), first.mean_return);
+    at_first(&first);
+    let rate = first.success_rate();
     if rate < WANTED {
-        return Ok((rate, mean_return));
+        return Ok(rate);
     }
     // A policy that succeeded at first is worth no more than what it does then.
-    let second: Evaluation = evaluate(task, actor, many, rng)?;
-    Ok((second.success_rate().min(rate), mean_return))
+    evaluate(task, actor, many, rng).map(|second| second.success_rate().min(rate))
 }
 
 /// Time since the beginning, by the wall and by the processor.

@@ -145,7 +145,7 @@ pub(crate) enum Learning {
     Fast,
     /// The paper's protocol.
     Paper,
-    /// The same options learnt by a tuned learner: ten times as fast, and without contact where that can be learnt.
+    /// The same with a tuned learner, which takes a tenth of the time for a step and far fewer steps.
     PaperTuned,
     /// The shipped prior as it is, certified: what learning on the map is worth.
     Prior,
@@ -233,15 +233,16 @@ pub(crate) struct Solve {
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
     /// The simulator in which policies are learnt and the plan is verified; they are described at `run`
-    /// [default: kinematic; with --learning paper rapier2d].
+    /// [default: kinematic; rapier2d with --learning paper and paper-tuned].
     #[arg(long, value_name = "kinematic|rapier2d|rapier3d")]
     pub(crate) simulator: Option<String>,
     /// Whether measured costs of options flow back into the search, or A* keeps its first ones.
     #[arg(long, value_enum, default_value_t = Switch::On)]
     pub(crate) cost_update: Switch,
-    /// What a failure counts for beside the seconds of a success: more makes plans safer and slower.
-    #[arg(long, value_name = "S", default_value_t = sharp_drive::FAILURE_COST_S)]
-    pub(crate) failure_cost: f64,
+    /// What a failure counts for beside the seconds of a success: more makes plans safer and slower
+    /// [default: 1000; 0 with --learning paper and paper-tuned].
+    #[arg(long, value_name = "S")]
+    pub(crate) failure_cost: Option<f64>,
     /// How guides are planned: along the ridge of clearance, or by the paper's learn-and-link trees.
     #[arg(long, value_enum, default_value_t = Guide::Ridge)]
     pub(crate) guide: Guide,

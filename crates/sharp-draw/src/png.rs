@@ -55,13 +55,34 @@ fn encode(pixmap: Pixmap) -> Result<Vec<u8>, EncodingError> {
     let mut encoder = Encoder::new(&mut bytes, width, height);
     encoder.set_color(if is_opaque { ColorType::Rgb } else { ColorType::Rgba });
     encoder.set_compression(Compression::Fast);
-    encoder.write_header()?.write_image_data(&pixels)?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&pixels)?;
+    writer.finish()?;
     Ok(bytes)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_keep_their_colors_and_what_is_seen_through() {
+        let picture = |fill: &str| {
+            let svg = format!(
+                "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"4\" height=\"2\">\
+                 <rect width=\"4\" height=\"2\" {fill}/></svg>"
+            );
+            let png = svg_to_png(&svg, 4).expect("a picture");
+            image::load_from_memory(&png).expect("a PNG")
+        };
+        let opaque = picture("fill=\"#ff8000\"");
+        assert_eq!((opaque.width(), opaque.height(), opaque.color()), (4, 2, image::ColorType::Rgb8));
+        assert_eq!(opaque.to_rgb8().get_pixel(3, 1).0, [255, 128, 0]);
+        let pane = picture("fill=\"#ff0000\" fill-opacity=\"0.5\"");
+        assert_eq!(pane.color(), image::ColorType::Rgba8);
+        let [red, .., alpha] = pane.to_rgba8().get_pixel(3, 1).0;
+        assert!(red > 250 && (126..=129).contains(&alpha), "{red} {alpha}");
+    }
 
     #[test]
     fn what_is_wrong_is_named() {

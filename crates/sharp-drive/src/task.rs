@@ -194,7 +194,7 @@ impl ActionOutcome {
             PolicyInterface::Guide { context, .. } => context.caution,
             PolicyInterface::Absolute { .. } => 0.0,
         };
-        let failed = self.collided || self.late;
+        let failed = self.collided || self.late || (self.done && !self.success);
         BatchStep {
             reward: self.reward as f32,
             failed,
@@ -232,13 +232,15 @@ impl RunningTask {
             Episode::new(world.vehicle(&*scenario.simulator, &noise, rules.contact_ends), rules);
         episode.begin(start, seed, number);
         let mut automaton = Automaton::new(links, Observation::first(start, &noise).without_slip_estimate());
+        let mut has_touched = false;
         // The learner begins where its guide does.
         while let Some(decision) = automaton.maneuver(&world).filter(|_| !automaton.is_late()) {
             let Ok(motion) = episode.carry_out(decision) else { break };
+            has_touched |= motion.contact;
             automaton.observe(&world, &motion);
         }
         let standstill = scenario.ends_at_standstill.then(|| StandstillDetector::new(episode.state().pose));
-        Self { world, interface, reward, horizon_share, episode, automaton, standstill, has_touched: false }
+        Self { world, interface, reward, horizon_share, episode, automaton, standstill, has_touched }
     }
 
     fn observe(&self, observation: &mut [f32]) {
@@ -287,7 +289,8 @@ impl RunningTask {
         ActionOutcome { reward, done, success, collided, late }
     }
 
-    fn reward(&self, motion: &Motion, before: &GuideProgress, success: bool) -> f64 {
+    /// Pays for `motion`; `done` if the termination set was reached, however that came about.
+    fn reward(&self, motion: &Motion, before: &GuideProgress, done: bool) -> f64 {
         let (option, after) = (&self.automaton.link().option, self.automaton.progress());
         let pose = &motion.after.pose;
         let stray = !option.is_allowed(pose);
@@ -296,7 +299,7 @@ impl RunningTask {
             pose,
             progress_m: after.arc_m - before.arc_m,
             deviation_m: after.cross_track_m.abs() - before.cross_track_m.abs(),
-            events: StepEvents { success, contact: motion.contact, stray },
+            events: StepEvents { success: done, contact: motion.contact, stray },
         })
     }
 }
@@ -402,6 +405,26 @@ mod tests {
         let steps: Vec<Step> = (0..10).map(|_| task.step(&[0.0, 0.0], &mut observation)).collect();
         assert!(steps[..9].iter().all(|step| !step.truncated), "not before five seconds: {steps:?}");
         assert!(steps[9].truncated && !steps[9].terminated, "a time-out is no end of the decision process");
+    }
+
+    #[test]
+    fn an_episode_with_a_contact_is_no_success_where_a_contact_costs() {
+        let (world, options) = (hall(), hall_options());
+        let (interface, _) = interfaces(&world).into_iter().next().expect("two");
+        let end = |contact: f64, has_touched: bool| {
+            let reward = Arc::new(PseudoReward { contact, ..PseudoReward::default() });
+            let links = vec![Link::new(options[1].clone(), None)];
+            let scenario = scenario(&world, links, NoiseModel::none(), (interface, reward));
+            let mut task = RunningTask { has_touched, ..RunningTask::begin(scenario, Seed(1), 0) };
+            let end = (0..200).map(|_| task.step(&[0.0, 0.0])).find(|outcome| outcome.done || outcome.late);
+            end.expect("the base follower arrives")
+        };
+        for (contact, has_touched, success) in [(0.0, true, true), (-3.0, false, true), (-3.0, true, false)] {
+            let end = end(contact, has_touched);
+            assert!(end.done && end.reward > 990.0, "the termination set is paid for: {end:?}");
+            assert_eq!(end.success, success, "a contact costs {contact}, touched: {has_touched}");
+            assert_eq!(end.into_batch_step(&interface).failed, !success);
+        }
     }
 
     #[test]

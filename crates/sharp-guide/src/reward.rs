@@ -59,8 +59,8 @@ pub struct PseudoReward {
     pub success: f64,
     /// `r_p`, astray.
     pub stray: f64,
-    /// Added for each step in which the robot touched an obstacle. The paper has no such term; where there is one, an episode
-    /// with a contact is no success.
+    /// Added for each step in which the robot touched an obstacle, 0 or less. The paper has no such term: 0. Where there is one
+    /// an episode with a contact is no success, though `r_t` is paid.
     pub contact: f64,
 }
 
@@ -112,7 +112,7 @@ impl Reward for PseudoReward {
 pub struct StepEvents {
     /// The termination set was reached.
     pub success: bool,
-    /// The robot touched an obstacle: ends the episode.
+    /// The robot touched an obstacle; [`Reward::contact_ends`] says whether that ends the episode.
     pub contact: bool,
     /// The robot is outside the states of the option: does not end the episode.
     pub stray: bool,
@@ -192,6 +192,14 @@ mod tests {
         // n(x) is the point at x = 4: 3.0067 m away, then 6 m to the end.
         let expected = -(trig::hypot(0.2, 3.0) + 6.0);
         assert!((reward.value(&guide, &pose, Place::Allowed) - expected).abs() < 1e-12, "on the way");
+    }
+
+    #[test]
+    fn a_contact_fails_where_it_ends_the_episode_or_costs() {
+        let paper = PseudoReward::default();
+        assert!(!paper.contact_fails() && ProgressReward::default().contact_fails());
+        let strict = PseudoReward { contact: -3.0, ..paper };
+        assert!(strict.contact_fails() && !strict.contact_ends());
     }
 
     #[test]

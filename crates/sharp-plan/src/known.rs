@@ -89,7 +89,8 @@ impl KnownOptions {
         self.guided.get(&id).map(|known| Ok(&known.option)).or_else(unguided)
     }
 
-    /// The price of the option called `id` by `pricer`, which is that of the method.
+    /// The price of the option called `id`. The first one asked for is kept, so `pricer` must have the settings of the method
+    /// that this was made for.
     pub(crate) fn price(&self, id: LegId, pricer: &Pricer<'_>) -> Option<&Price> {
         let known = self.guided.get(&id)?;
         Some(known.price.get_or_init(|| pricer.price(&known.option, None)))

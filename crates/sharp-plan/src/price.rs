@@ -103,23 +103,21 @@ impl<'a> Pricer<'a> {
 
     /// The cost of a leg in seconds where `measured` is known of it beside its `price`.
     ///
-    /// The price of the model counts as so many episodes more: it knows little of rare failures, and so do a hundred episodes.
-    /// The paper's rule knows no price of a failure: its cost of a learnt option is the mean number of steps (line 17).
+    /// The price counts as so many episodes more: it knows little of rare failures, and so do a hundred episodes.
     pub(crate) fn cost_s(&self, price: &Price, measured: Option<&SuccessEstimate>) -> f64 {
         let Price { time_s, success } = *price;
         let Some(SuccessEstimate { count, mean_time_s }) = measured else {
             return expected_cost_s(time_s, success, self.failure_cost_s);
         };
-        let (weight, failure_cost_s) = match self.settings.price {
-            PriceRule::Model => (self.settings.price_episodes, self.failure_cost_s),
-            PriceRule::Profile => (0.0, self.failure_cost_s),
-            PriceRule::Length => (0.0, 0.0),
+        let weight = match self.settings.price {
+            PriceRule::Model => self.settings.price_episodes,
+            PriceRule::Length | PriceRule::Profile => 0.0,
         };
         let episodes = weight + f64::from(count.episodes);
         let successes = weight * success + f64::from(count.successes);
         let time_s = if mean_time_s.is_finite() || weight == 0.0 { *mean_time_s } else { time_s };
         let success = if episodes > 0.0 { successes / episodes } else { 0.0 };
-        expected_cost_s(time_s, success, failure_cost_s)
+        expected_cost_s(time_s, success, self.failure_cost_s)
     }
 }
 
@@ -161,9 +159,8 @@ mod tests {
 
     #[test]
     fn the_other_rules_take_what_was_measured() {
-        assert_eq!(cost_s(PriceRule::Profile, measured(10, 10)), 8.0);
+        assert_eq!(cost_s(PriceRule::Length, measured(10, 10)), 8.0);
         assert_eq!(cost_s(PriceRule::Profile, measured(10, 5)), 16.0 + 500.0);
-        assert_eq!(cost_s(PriceRule::Length, measured(10, 5)), 16.0, "the paper has no price of a failure");
     }
 
     #[test]

@@ -25,8 +25,8 @@ const EPISODES_MAX: u32 = 1_000_000;
 pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> {
     let stopwatch = Stopwatch::start("load");
     let time_limit = args.time_limit.map(limit).transpose()?;
-    if !(args.failure_cost.is_finite() && args.failure_cost >= 0.0) {
-        let message = format!("--failure-cost is {}, expected seconds, 0 or more", args.failure_cost);
+    if let Some(cost_s) = args.failure_cost.filter(|cost_s| !(cost_s.is_finite() && *cost_s >= 0.0)) {
+        let message = format!("--failure-cost is {cost_s}, expected seconds, 0 or more");
         return Err(Failure::new("USAGE", message));
     }
     if !(0.0..=1.0).contains(&args.min_success) {
@@ -138,7 +138,7 @@ fn limit(seconds: f64) -> Result<Duration, Failure> {
 fn method(args: &Solve) -> Result<Method, Failure> {
     let mut method = Method::by_name(args.learning.name()).expect("every word names a method");
     method.search.cost_update = args.cost_update == Switch::On;
-    method.failure_cost_s = args.failure_cost;
+    method.failure_cost_s = args.failure_cost.unwrap_or(method.failure_cost_s);
     method.search.goal_heading_tolerance_rad = heading_tolerance(args)?;
     if args.verify != "auto" {
         let episodes = args.verify.parse().ok().filter(|episodes| (0..=EPISODES_MAX).contains(episodes));

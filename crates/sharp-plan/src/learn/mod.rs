@@ -102,7 +102,7 @@ impl LearntPolicy {
 
     /// The cost that A* uses (line 17), seconds: mean time per success, and `failure_cost_s` for each failure.
     ///
-    /// The paper takes the mean number of steps and knows no failure.
+    /// The paper takes the mean number of steps, which knows no failure: 0.
     #[must_use]
     pub fn cost_s(&self, failure_cost_s: f64) -> f64 {
         self.estimate.cost_s(failure_cost_s)

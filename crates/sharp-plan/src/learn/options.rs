@@ -125,8 +125,7 @@ type Lesson = (Result<LearntPolicy, LearnFailure>, Option<TrainingFile>);
 
 /// Learns what `task` asks for, unless the `folder` of trainings has it, and tells the monitor.
 fn learn(problem: &PlanningProblem<'_>, task: &LearningTask<'_>, folder: Option<&Path>) -> Lesson {
-    let new_file =
-        |folder| TrainingFile::new(folder, task.option.id, &decides_training(problem, task));
+    let new_file = |folder| TrainingFile::new(folder, task.option.id, &decides_training(problem, task));
     let file = folder.map(new_file);
     let result = learn_or_find(problem, task, file.as_ref());
     if let Ok(learnt) = &result {
@@ -187,7 +186,10 @@ fn decides_training(problem: &PlanningProblem<'_>, task: &LearningTask<'_>) -> S
     let LearningTask { option, next, states, seed, .. } = task;
     let corridors = [Some(*option), *next].map(|option| option.map(|option| corridor(option, &world.grid)));
     let (learner, episodes) = (&method.learner, method.estimate_episodes);
-    format!("{:?} {:?} {corridors:?} {states:?} {seed:?} {learner:?} {episodes}", world.robot, conditions.noise)
+    format!(
+        "{:?} {:?} {corridors:?} {states:?} {seed:?} {learner:?} {episodes}",
+        world.robot, conditions.noise
+    )
 }
 
 /// Keeps what was learnt of `option`; false if learning was stopped.

@@ -400,7 +400,7 @@ def solve(
 ) -> Plan:
     """Solves a problem: from `start` (x, y, yaw) to `goal` (x, y), or `problem` 1 to 5 of a named map.
 
-    `options` is "interface" or "centroid", `learning` "fast", "prior", "paper" or "paper-success", `noise` "none", "nominal", "harsh",
+    `options` is "interface" or "centroid", `learning` "fast", "prior", "paper" or "paper-tuned", `noise` "none", "nominal", "harsh",
     "biased", one of them with a factor ("nominal*2") or a file. `library` is a folder that keeps what is learnt. `progress` is
     called with a phase and a message, from any thread; what it raises ends the solve. `time_limit` is in seconds.
     Equal seeds give equal plans, from equal libraries and without a time limit.

@@ -139,7 +139,7 @@ fn mean_wall(lines: &[&PaperLine], decimals: usize) -> String {
 fn problems(paper: &[&PaperLine], fast: &[&PaperLine]) -> String {
     let mut text = String::from(
         "\nEach problem. *Steps* are those of its trainings, the median and the most; *no stop* are trainings that used up \
-         150,000 steps before they met it:\n\n\
+         their steps before they met the stop:\n\n\
          | problem | status | wall s | cpu s | trained | reused | steps | no stop | contact allowed | without | default: s | without |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
