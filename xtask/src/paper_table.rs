@@ -5,6 +5,7 @@
 //! measures what has no line yet.
 
 use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -67,10 +68,13 @@ impl PaperTable {
         };
         let out = PathBuf::from(OUT);
         fs::create_dir_all(root().join(&out)).context("cannot make out/paper")?;
-        // A later build must not change what runs for hours. Another call may run what is there already.
-        let (fresh, program) = (built("sharp")?, root().join(&out).join("sharp"));
-        if fs::read(&fresh).ok() != fs::read(&program).ok() {
-            fs::copy(fresh, &program).context("cannot copy sharp into out/paper")?;
+        // A later build must not change what runs for hours, and another call may run another build.
+        let fresh = fs::read(built("sharp")?).context("cannot read sharp")?;
+        let mut hasher = DefaultHasher::new();
+        fresh.hash(&mut hasher);
+        let program = root().join(&out).join(format!("sharp-{:016x}", hasher.finish()));
+        if !program.exists() {
+            fs::copy(built("sharp")?, &program).context("cannot copy sharp into out/paper")?;
         }
         std::env::set_current_dir(root()).context("cannot go to the root")?;
         let site = PaperSite {

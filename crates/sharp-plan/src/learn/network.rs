@@ -83,9 +83,10 @@ pub(crate) fn train_network(
         return Err(LearnFailure::Stopped);
     }
     let policy = network_policy(training, &trained.actor);
-    // What counts as a success is what it was trained for: in the paper a robot may touch a wall.
+    // In the paper a robot may touch a wall and go on. That counts as a success here too, whatever a contact costs the learner:
+    // the search is to know how long the option takes.
     let trial = task.monte_carlo(task.estimate_episodes, "certify", 0);
-    let trial = trial.with_contact_ends(training.reward.contact_fails());
+    let trial = trial.with_contact_ends(training.reward.contact_ends());
     let estimate = trial.estimate(&task.drivers(&policy)[..1], &task.states);
     let record = Training { stop: trained.stop, mean_return: trained.evaluation.mean_return, points };
     Ok(LearntPolicy {

@@ -23,7 +23,8 @@ pub(super) fn text(lines: &[&PaperLine]) -> String {
         let (cpu, cores) = (&line.machine.cpu, line.machine.cores);
         _ = writeln!(
             text,
-            "Machine: {cpu}, {cores} cores, shared with other work at times. Seed 1, one trial."
+            "Machine: {cpu}, {cores} core{}, shared with other work at times. Seed 1, one trial.",
+            if cores == 1 { "" } else { "s" }
         );
     }
     let of = |method: &str| -> Vec<&PaperLine> {
