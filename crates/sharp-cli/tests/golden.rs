@@ -160,6 +160,8 @@ fn stages(folder: &Path, threads: &str) -> BTreeMap<String, String> {
     let library = library.expect("one world").expect("an entry").path();
     let mut options: Vec<_> =
         fs::read_dir(library).expect("options").map(|entry| entry.expect("an entry").path()).collect();
+    // Pictures lie beside them.
+    options.retain(|path| path.extension().is_none_or(|extension| extension != "svg" && extension != "png"));
     options.sort();
     let options: Vec<u8> = options.iter().flat_map(|path| fs::read(path).expect("an option")).collect();
     let mut drive: Value =
