@@ -26,11 +26,11 @@ pub fn write(folder: &Path, name: &str, svg: &str) -> Result<(), BenchError> {
     Ok(())
 }
 
-/// Like [`write`], for a picture that never changes: it is taken from `kept`, a path without extension, if it is there, and
+/// Like [`write()`], for a picture that never changes: it is taken from `kept`, a path without extension, if it is there, and
 /// kept there otherwise. A folder that cannot be written keeps nothing.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_kept(
     folder: &Path,
     name: &str,

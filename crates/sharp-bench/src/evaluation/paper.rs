@@ -237,7 +237,7 @@ fn figures(lines: &[&PaperLine], protocol: &Protocol) -> Vec<Figure> {
     let results: Vec<ResultLine> = shown.map(result).collect();
     let results: Vec<&ResultLine> = results.iter().collect();
     let ([time, success, curves], titles) = (protocol.names, protocol.titles);
-    let own: Vec<&PaperLine> = lines.iter().copied().filter(|line| is_own(&line)).collect();
+    let own: Vec<&PaperLine> = lines.iter().copied().filter(|line| is_own(line)).collect();
     let mut figures =
         vec![rows::time(time, titles[0], &results), rows::success(success, titles[1], &results)];
     figures.extend(curves::figure((curves, titles[2]), own));
