@@ -26,8 +26,8 @@ const UNGUIDED_SPEED: f64 = 0.6;
 const LEARNT_SPEED: f64 = 0.7;
 
 /// What the reward of [`Method::paper_tuned`] adds for each step with a contact; reaching the termination set is worth 1,000.
-/// With -10 and more, or where a contact ended the episode, robots in tight places learnt to stay there.
-pub const TUNED_CONTACT: f64 = -3.0;
+/// With -3 and more, or where a contact ended the episode, robots before a narrow place may learn to stay where they are.
+pub const TUNED_CONTACT: f64 = -1.0;
 
 /// How a problem is solved.
 #[derive(Clone, Debug)]
