@@ -172,8 +172,10 @@ fn missing<'a>(
 ) -> Vec<&'a Value> {
     let is_same = |a: &Value, b: &Value| NamedRow(a).group() == NamedRow(b).group();
     let of_chain = |chain: &'a [Value]| {
-        let is_whole = chain.iter().all(|row| known.contains(&NamedRow(row).name()));
-        let left = chain.iter().skip_while(|row| has_learnt(&NamedRow(row)));
+        let is_known = |row: &NamedRow<'_>| known.contains(&row.name());
+        let is_whole = chain.iter().all(|row| is_known(&NamedRow(row)));
+        // Whoever removes a line wants it measured again.
+        let left = chain.iter().skip_while(|row| is_known(&NamedRow(row)) && has_learnt(&NamedRow(row)));
         left.take_while(|row| !is_whole && is_chosen(row)).collect::<Vec<_>>()
     };
     rows.chunk_by(is_same).flat_map(of_chain).collect()
@@ -284,6 +286,7 @@ mod tests {
         assert_eq!(left("", &[1]), [2, 3], "problem 2 is known from another library");
         assert_eq!(left("p3", &[1, 2]), [3]);
         assert!(left("p3", &[]).is_empty(), "problem 3 needs what 1 and 2 learnt");
+        assert_eq!(left("", &[1, 2, 3]), [3], "its line was removed");
     }
 
     #[test]
