@@ -193,21 +193,22 @@ pub(crate) fn refine(
         let count = nearest_count(piece.success, piece.episodes);
         let mean_time_s = if count.successes > 0 { piece.time_s } else { f64::INFINITY };
         let few = SuccessEstimate { count, mean_time_s };
-        let mut all = OwnStretch::new(problem, plan, known, ends).drive(MORE, "more").and(&few);
         let cost_s = |estimate: &SuccessEstimate| estimate.cost_s(problem.method.failure_cost_s);
-        let is_weak = all.count.rate() < STAND_IN_BELOW;
-        let follower = if is_weak { stand_in(problem, plan, known, ends) } else { None };
+        let follower =
+            if count.rate() < STAND_IN_BELOW { stand_in(problem, plan, known, ends) } else { None };
+        // Who did better in a few runs is driven more often, and the other one if that was chance.
         let other = follower.and_then(|(leg, follower)| {
             let by_follower = OwnStretch::new(problem, plan, known, ends).with_policy(leg, &follower);
-            let is_better = |estimate: &SuccessEstimate| cost_s(estimate) < cost_s(&all);
-            let few = by_follower.drive(exactly(EPISODES[0]), "follower");
-            let more = || by_follower.drive(exactly(MORE.episodes.0), "more by follower");
-            let estimate = is_better(&few).then(|| more().and(&few))?;
+            let is_better = |estimate: &SuccessEstimate| cost_s(estimate) < cost_s(&few);
+            let its_few = by_follower.drive(exactly(EPISODES[0]), "follower");
+            let estimate =
+                is_better(&its_few).then(|| by_follower.drive(MORE, "more by follower").and(&its_few))?;
             is_better(&estimate).then_some((leg, follower, estimate))
         });
-        if let Some((_, _, estimate)) = &other {
-            all = *estimate;
-        }
+        let all = match &other {
+            Some((_, _, estimate)) => *estimate,
+            None => OwnStretch::new(problem, plan, known, ends).drive(MORE, "more").and(&few),
+        };
         let time_s = if all.count.successes >= TIMED_MIN { all.mean_time_s } else { piece.time_s };
         let (success, runs) = (all.count.rate(), all.count.episodes);
         (PlanPiece { success, episodes: f64::from(runs), time_s, runs, ..*piece }, other)

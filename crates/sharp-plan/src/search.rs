@@ -403,7 +403,10 @@ impl<'a> Search<'a> {
             let tried = if is_doubtful { self.tried_in(tried.option, DOUBTFUL_EPISODES) } else { tried };
             Some((tried, number))
         };
-        let all: Vec<Option<usize>> = (0..self.departures().len()).map(Some).collect();
+        let mut all: Vec<Option<usize>> = (0..self.departures().len()).map(Some).collect();
+        // Where no way did well for another leg, the best of them then is enough for this one.
+        let least_bad = self.least_bad.get().copied();
+        all.sort_by_key(|way| Some(*way) != least_bad);
         let mut best: Option<(TriedLeg, Option<usize>)> = None;
         let mut is_settled = false;
         let side_by_side =
@@ -414,7 +417,7 @@ impl<'a> Search<'a> {
             if is_settled || best.as_ref().is_none_or(|(best, _)| tried.cost_s < best.cost_s) {
                 best = Some((tried, number));
             }
-            if is_settled {
+            if is_settled || Some(number) == least_bad {
                 break;
             }
         }
