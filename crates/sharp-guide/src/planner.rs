@@ -48,8 +48,9 @@ impl GuidePlanner for ClearanceSearch {
         let start = request.start.heading.map(|heading| Pose::at(request.start.position, heading));
         let mut robots = robot.inflated_at(start).filter(|_| settings.margins);
         let Some(widest) = robots.next() else { return plan_guide(request, robot, &settings, rng) };
-        largest_margin(request, widest, &robots.collect::<Vec<_>>(), &settings)
-            .or_else(|_| sample_guide(request, robot, &settings, rng))
+        let searched = largest_margin(request, widest, &robots.collect::<Vec<_>>(), &settings);
+        let may_sample = settings.sampling.budget.iterations > 0;
+        if searched.is_ok() || !may_sample { searched } else { sample_guide(request, robot, &settings, rng) }
     }
 }
 

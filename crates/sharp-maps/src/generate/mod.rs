@@ -111,15 +111,18 @@ const CLEARANCE_TO_PASS_M: f64 = 0.42;
 /// Share of the passable area that must be connected.
 const CONNECTED_SHARE: f64 = 0.8;
 
+/// The least side of a map, metres: rooms, a corridor around them and a block with a door need so much.
+pub const SIDE_MIN_M: f64 = 14.0;
+
 /// A square map of `kind`, `size_m` metres wide, turned and mirrored at random.
 ///
 /// At least four fifths of the area that a Husky (1.0 m by 0.67 m) can reach at all are connected.
 ///
 /// # Panics
-/// If the map would have fewer than 40 or more than 32 767 cells a side, or is under 8 m wide.
+/// If the map would have fewer than 40 or more than 32 767 cells a side, or is under [`SIDE_MIN_M`] wide.
 #[must_use]
 pub fn generate(kind: FloorplanKind, size_m: f64, resolution_m: f64, rng: &mut Stream) -> OccupancyGrid {
-    assert!(size_m >= 8.0, "a floor plan of {size_m} m is too small for doors and corridors");
+    assert!(size_m >= SIDE_MIN_M, "a floor plan of {size_m} m is too small for doors and corridors");
     let side = (size_m / resolution_m).round();
     assert!((40.0..=32_767.0).contains(&side), "a floor plan {side} cells wide");
     // Nearly every draw is connected. If none of these is, the result is an empty hall.
@@ -229,6 +232,16 @@ mod tests {
                         .all(|&(col, row)| !grid.is_free(Cell::new(col, row)))
                 });
                 assert!(border_closed, "{kind:?} {seed} has a hole in its border");
+            }
+        }
+    }
+
+    #[test]
+    fn every_kind_has_room_in_the_smallest_map() {
+        for kind in FloorplanKind::ALL {
+            for seed in 0..20 {
+                let drawn = generate(kind, SIDE_MIN_M, 0.1, &mut Seed(seed).stream("small", kind as u64));
+                assert!(is_connected(&drawn), "{kind:?} {seed} is in pieces");
             }
         }
     }
