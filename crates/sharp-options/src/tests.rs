@@ -363,8 +363,9 @@ fn the_conformance_check_finds_what_is_wrong() {
         let set = OptionSet::new(OptionKind::Centroid, endpoints, options).unwrap();
         check_set(&set, &rbvd).unwrap_err().to_string()
     };
-    let message = "endpoint 1 names state 9, which does not exist";
-    assert_eq!(spoilt(&|endpoints, _| endpoints[1].states = vec![StateId(9)]), message);
+    let count = rbvd.len() as u32;
+    let message = format!("endpoint 1 names state {count}, which does not exist");
+    assert_eq!(spoilt(&|endpoints, _| endpoints[1].states = vec![StateId(count)]), message, "one too many");
     let message = "endpoint 1 does not contain its own center";
     assert_eq!(spoilt(&|endpoints, _| endpoints[1].states = vec![StateId(0)]), message);
     let message = "option c:0-1 leaves state 0 but begins at endpoint 2, which does not touch it";
