@@ -162,3 +162,20 @@ impl NoGuide {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_fails_at_a_place_far_away_is_beyond() {
+        let (here, there) = (Point::new(1.0, 1.0), Point::new(4.0, 5.0));
+        for reason in [NoGuide::Footprint(there), NoGuide::Bend(there), NoGuide::Astray(there)] {
+            let is_beyond = [4.9, 5.0, 5.1].map(|reach_m| reason.is_beyond(here, reach_m));
+            assert_eq!(is_beyond, [true, false, false], "{reason}: five metres away");
+        }
+        for reason in [NoGuide::LeadIn(there), NoGuide::Unreachable, NoGuide::Exhausted { iterations: 9 }] {
+            assert!(!reason.is_beyond(here, 1.0), "{reason}: says nothing of the place");
+        }
+    }
+}

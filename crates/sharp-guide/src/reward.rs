@@ -84,18 +84,22 @@ impl PseudoReward {
             }
         }
     }
-}
 
-impl Reward for PseudoReward {
-    fn reward(&self, transition: &Transition<'_>) -> f64 {
-        let StepEvents { success, stray, contact } = transition.events;
-        let place = match (success, stray) {
+    /// The same by what happened on the way to `pose`, and what a contact costs.
+    fn paid(&self, guide: &GuidePath, pose: &Pose, events: StepEvents) -> f64 {
+        let place = match (events.success, events.stray) {
             (true, _) => Place::Termination,
             (false, true) => Place::Astray,
             (false, false) => Place::Allowed,
         };
-        let contact = if contact { self.contact } else { 0.0 };
-        self.value(&transition.option.guide, transition.pose, place) + contact
+        let contact = if events.contact { self.contact } else { 0.0 };
+        self.value(guide, pose, place) + contact
+    }
+}
+
+impl Reward for PseudoReward {
+    fn reward(&self, transition: &Transition<'_>) -> f64 {
+        self.paid(&transition.option.guide, transition.pose, transition.events)
     }
 
     fn contact_ends(&self) -> bool {
@@ -200,6 +204,17 @@ mod tests {
         assert!(!paper.contact_fails() && ProgressReward::default().contact_fails());
         let strict = PseudoReward { contact: -3.0, ..paper };
         assert!(strict.contact_fails() && !strict.contact_ends());
+    }
+
+    #[test]
+    fn a_contact_costs_beside_what_the_place_pays() {
+        let strict = PseudoReward { contact: -3.0, ..PseudoReward::default() };
+        let pose = Pose::new(4.0, 0.0, 0.0);
+        let events = StepEvents { contact: true, ..StepEvents::default() };
+        assert_eq!(strict.paid(&straight(), &pose, StepEvents::default()), -6.0, "six metres are left");
+        assert_eq!(strict.paid(&straight(), &pose, events), -9.0, "and the wall");
+        let success = StepEvents { success: true, ..events };
+        assert_eq!(strict.paid(&straight(), &pose, success), 997.0, "a success at a wall is one");
     }
 
     #[test]

@@ -71,13 +71,13 @@ fn broken_guide_planners_are_found_out() {
         GuidePath::new(poses[..poses.len() - 3].to_vec(), 0.25).map_err(|_| NoGuide::Unreachable)
     });
     assert!(short.contains("which was not asked for"), "{short}");
-    // Up into the wall beside the gap, for a third of a metre of the way.
+    // Up into the wall beside the gap, and down again.
     let through = found(|request, _| {
         let (from, to) = (request.start.position, request.goal.position);
         Ok(polyline(&[from, Point::new(4.5, 2.0), Point::new(4.6, 2.5), Point::new(4.9, 2.0), to]))
     });
     assert!(through.starts_with("the outline touches an obstacle"), "{through}");
-    // Through the lower half of the gap, whatever is allowed.
+    // Before the gap it goes down into rows that are not allowed.
     let astray = found(|request, guide| {
         let (from, to) = (request.start.position, request.goal.position);
         let is_asked_for_less = !(request.allowed)(sharp_space::Cell::new(3, 2));

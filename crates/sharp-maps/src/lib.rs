@@ -30,4 +30,4 @@ pub use formats::{
     Door, LoadOptions, MapError, MapFile, MovingAiProblem, Problem, ValueMask, load, load_doors,
     load_scenario, load_values, named_maps, save_ros,
 };
-pub use generate::{FloorplanKind, SIDE_MIN_M, generate, turned_from};
+pub use generate::{FloorplanKind, generate, turned_from};

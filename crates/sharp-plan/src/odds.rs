@@ -173,7 +173,7 @@ fn cuts(plan: &[Arc<GuidedOption>]) -> Vec<(Option<usize>, usize)> {
 }
 
 /// The `odds` of `plan` with more runs of those pieces that no library has and that failed at times: for the plan that is taken.
-/// Where the follower drives its first or last leg better than the prior, it does so from now on.
+/// Where the follower drives its first or last leg better than the prior, the follower drives it from now on.
 ///
 /// # Errors
 /// If the library cannot be written.
@@ -194,20 +194,26 @@ pub(crate) fn refine(
         let mean_time_s = if count.successes > 0 { piece.time_s } else { f64::INFINITY };
         let few = SuccessEstimate { count, mean_time_s };
         let cost_s = |estimate: &SuccessEstimate| estimate.cost_s(problem.method.failure_cost_s);
-        let follower =
-            if count.rate() < STAND_IN_BELOW { stand_in(problem, plan, known, ends) } else { None };
-        // Who did better in a few runs is driven more often, and the other one if that was chance.
-        let other = follower.and_then(|(leg, follower)| {
+        // The follower, if it does better than `prior`. The runs that choose it are not those that it is judged by.
+        let stand_in_for = |prior: &SuccessEstimate| {
+            let (leg, follower) = stand_in(problem, plan, known, ends)?;
             let by_follower = OwnStretch::new(problem, plan, known, ends).with_policy(leg, &follower);
-            let is_better = |estimate: &SuccessEstimate| cost_s(estimate) < cost_s(&few);
-            let its_few = by_follower.drive(exactly(EPISODES[0]), "follower");
-            let estimate =
-                is_better(&its_few).then(|| by_follower.drive(MORE, "more by follower").and(&its_few))?;
+            let is_better = |estimate: &SuccessEstimate| cost_s(estimate) < cost_s(prior);
+            let estimate = is_better(&by_follower.drive(exactly(EPISODES[0]), "follower"))
+                .then(|| by_follower.drive(MORE, "more by follower"))?;
             is_better(&estimate).then_some((leg, follower, estimate))
-        });
-        let all = match &other {
-            Some((_, _, estimate)) => *estimate,
-            None => OwnStretch::new(problem, plan, known, ends).drive(MORE, "more").and(&few),
+        };
+        // A piece comes here because a run failed, so these few look worse than the prior is. Only where they leave no doubt
+        // are they enough to put the follower in its place.
+        let is_clear = count.upper95() < STAND_IN_BELOW;
+        let at_once = if is_clear { stand_in_for(&few) } else { None };
+        let (all, other) = if let Some(at_once) = at_once {
+            (at_once.2, Some(at_once))
+        } else {
+            let prior = OwnStretch::new(problem, plan, known, ends).drive(MORE, "more").and(&few);
+            let is_weak = !is_clear && prior.count.rate() < STAND_IN_BELOW;
+            let other = if is_weak { stand_in_for(&prior) } else { None };
+            (other.as_ref().map_or(prior, |other| other.2), other)
         };
         let time_s = if all.count.successes >= TIMED_MIN { all.mean_time_s } else { piece.time_s };
         let (success, runs) = (all.count.rate(), all.count.episodes);

@@ -329,4 +329,54 @@ mod tests {
             assert_eq!(informed, blind, "{kind:?}: the heuristic overestimates");
         }
     }
+
+    #[test]
+    fn costs_are_seconds_and_add_up_at_any_top_speed() {
+        let graph = graph(HALL, OptionKind::Centroid, along());
+        // 8 m at 4 m/s, and half a second for each of three hand-overs; a bypass is quicker to see and dearer.
+        let cost = |leg: &Candidate| cost_m(leg) / 4.0 + if leg.is_bypass { 5.0 } else { 0.0 };
+        let (seconds, legs) = graph.search(4.0, cost, |_, _| 0.5).expect("an open hall");
+        assert_eq!(names(&legs), "first:0 c:0-1 c:1-2 last:2", "in {seconds} s");
+        assert!((seconds - 3.5).abs() < 1e-9, "{seconds} s");
+    }
+
+    #[test]
+    fn the_centroid_next_door_may_be_the_first_and_the_last() {
+        let graph = graph(HALL, OptionKind::Centroid, along());
+        let cost = |leg: &Candidate| if leg.id() == LegId::Direct { f64::INFINITY } else { 1.0 };
+        let (count, legs) = graph.search(f64::INFINITY, cost, |_, _| 0.0).expect("an open hall");
+        assert_eq!((names(&legs).as_str(), count), ("first:1 last:1", 2.0), "the fewest legs");
+        let option = |text: &str| LegId::Option(text.parse().expect("a name"));
+        let passes = |id: LegId| graph.candidate(id).map(|leg| leg.is_bypass);
+        for (id, expected) in [
+            (LegId::First(0), Some(false)),
+            (LegId::First(1), Some(true)),
+            (LegId::First(2), None),
+            (LegId::Direct, Some(false)),
+            (option("c:0-1"), Some(false)),
+            (option("c:0-1-2"), Some(true)),
+            (LegId::Last(2, StateId(2)), Some(false)),
+            (LegId::Last(1, StateId(1)), Some(true)),
+            (LegId::Last(0, StateId(0)), None),
+        ] {
+            assert_eq!(passes(id), expected, "{id}: whether it passes a centroid, if there is such a leg");
+        }
+    }
+
+    #[test]
+    fn no_option_leads_back_to_where_the_one_before_came_from() {
+        let graph = graph(HALL, OptionKind::Centroid, along());
+        let mut pairs: Vec<String> =
+            graph.option_pairs().map(|(before, after)| format!("{before} {after}")).collect();
+        pairs.sort();
+        let expected = [
+            "c:0-1 c:1-2",
+            "c:0-1-2 c:2-1",
+            "c:1-0 c:0-1-2",
+            "c:1-2 c:2-1-0",
+            "c:2-1 c:1-0",
+            "c:2-1-0 c:0-1",
+        ];
+        assert_eq!(pairs, expected);
+    }
 }

@@ -133,7 +133,11 @@ mod tests {
 
     use super::*;
     use crate::method::Method;
+    use crate::test_worlds::straight;
     use crate::test_worlds::{HALL, along, options, world};
+    use sharp_drive::SpeedLimits;
+    use sharp_rbvd::StateId;
+    use sharp_sim::RobotModel;
 
     fn cost_s(rule: PriceRule, measured: Option<SuccessEstimate>) -> f64 {
         let (world, _) = world(HALL, OptionKind::Centroid);
@@ -174,5 +178,72 @@ mod tests {
             let at_top_s = option.guide.length_m() / world.robot.max_speed_mps;
             assert!((0.7 * at_top_s..6.0 * at_top_s + 10.0).contains(&cost_s), "{rule:?}: {cost_s} s");
         }
+    }
+
+    fn by_rule(world: &World, rule: PriceRule) -> Pricer<'_> {
+        let settings = SearchSettings { price: rule, ..SearchSettings::default() };
+        Pricer::new(world, &NoiseModel::nominal(), settings, 1000.0)
+    }
+
+    #[test]
+    fn leaving_a_tight_place_takes_time_and_may_fail() {
+        let (world, abstraction) = world(HALL, OptionKind::Centroid);
+        let pricer = by_rule(&world, PriceRule::Length);
+        let first = (*options(&world, &abstraction, along())[0]).clone();
+        let option = GuidedOption { guide: straight((1.0, 2.2), (5.0, 2.2)), ..first };
+        for (back_off_m, careful_m, wanted, what) in [
+            (0.0, 0.0, (8.0, 1.0), "4 m at 0.5 m/s"),
+            (0.6, 0.0, (11.0, 0.99), "2 s backwards, and 1 s to stop and start"),
+            (0.6, 1.0, (19.0, 0.99), "of the 4 m one takes 10 s"),
+        ] {
+            let leaving = option.clone().with_departure(Departure { back_off_m, careful_m });
+            let (time_s, success) = pricer.price(&leaving, None).parts();
+            assert!((time_s - wanted.0).abs() < 1e-6, "{what}: {time_s} s, not {} s", wanted.0);
+            assert_eq!(success, wanted.1, "{what}");
+        }
+    }
+
+    #[test]
+    fn lengths_profiles_and_speed_limits_become_seconds() {
+        let (husky, _) = world(HALL, OptionKind::Centroid);
+        let free =
+            World::new((*husky.grid).clone(), RobotModel { max_speed_mps: 0.8, ..RobotModel::husky() });
+        let frame = *free.grid.frame();
+        let limited = |limit_mps: f32| {
+            let limits = SpeedLimits::new(frame, vec![limit_mps; frame.len()]).expect("sound limits");
+            free.clone().with_speed_limits(limits)
+        };
+        let guide = straight((1.0, 2.2), (9.0, 2.2));
+        let time_s =
+            |world: &World, rule| by_rule(world, rule).of_guide(LegId::Direct, &guide, None).parts().0;
+        let at_limits = [&free, &limited(0.25), &limited(1.0)].map(|world| time_s(world, PriceRule::Length));
+        for (found_s, wanted_s) in at_limits.into_iter().zip([20.0, 32.0, 20.0]) {
+            assert!(
+                (found_s - wanted_s).abs() < 1e-6,
+                "8 m without a limit, at 0.25 and at 1 m/s: {at_limits:?}"
+            );
+        }
+        let tuned = ProfiledFollower::tuned(&free.robot, &NoiseModel::nominal()).speed;
+        let (priced_s, profile_s) = (time_s(&free, PriceRule::Profile), tuned.time_s(&free, &guide));
+        assert!(
+            (priced_s / profile_s - 0.72).abs() < 1e-9,
+            "{priced_s} s where the profile takes {profile_s} s"
+        );
+    }
+
+    #[test]
+    fn a_first_leg_begins_at_rest_and_a_last_one_ends_at_the_goal() {
+        let ends = |id: LegId| {
+            let GuideEnds { from_rest, to_goal } = guide_ends(id);
+            (from_rest, to_goal)
+        };
+        assert_eq!(ends(LegId::First(0)), (true, false), "from the start to an endpoint");
+        assert_eq!(ends(LegId::Direct), (true, true), "from the start to the goal");
+        assert_eq!(ends(LegId::Last(0, StateId(0))), (false, true), "from an endpoint to the goal");
+        assert_eq!(
+            ends(LegId::Option("c:0-1".parse().expect("a name"))),
+            (false, false),
+            "between endpoints"
+        );
     }
 }

@@ -31,8 +31,8 @@ use crate::query::{Monitor, Phase, Query};
 const HARD_HAND_OVER_S: f64 = 120.0;
 /// A car turns no further than this without a loop, whatever the clearance: 120 degrees.
 const CAR_TURN_MAX_RAD: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
-/// A start or goal without a state of its own belongs to the nearest one within this distance, metres: a robot may
-/// stand where the diagram's margin has no state.
+/// A start or goal without a state of its own belongs to the nearest one within this distance, metres, or in a cell beside it:
+/// a robot may stand where the diagram's margin has no state.
 const STATE_NEAR_M: f64 = 0.5;
 
 /// Poses that the search for a direct route expands before it gives up: 0.1 to 0.3 s of one core.
@@ -49,6 +49,8 @@ const TRIAL_M: f64 = 2.5;
 const WAYS_AT_ONCE: usize = 2;
 /// What is in the way further from the start than this cannot be helped by leaving it otherwise, metres.
 pub(crate) const DEPARTURE_REACH_M: f64 = 4.0;
+/// The best way out for an earlier leg is enough for the next one if it succeeds at most so much less often.
+const LESS: f64 = 0.1;
 /// A leg from the start that succeeds less often than this, by its price and then when tried, looks for a better way to
 /// begin.
 const LEAVES_WELL: f64 = 0.98;
@@ -73,12 +75,13 @@ pub struct Search<'a> {
     departures: OnceLock<Vec<(Departure, Vec<Pose>)>>,
     /// Under what they are tried; by their prices alone without.
     trials: Option<&'a Conditions>,
-    /// Whether an answer is wanted at once: then they are tried for the first leg that is asked for, until one does well.
+    /// Whether an answer is wanted at once: then they are tried for the first leg that is asked for, until one does well. If
+    /// none does, the best of them is tried first for the next leg.
     is_hurried: bool,
     /// Which of them it was then; `None` for driving at once.
     chosen: OnceLock<Option<usize>>,
-    /// The first of them that was the best for a leg, where none did well.
-    least_bad: OnceLock<Option<usize>>,
+    /// If no way did well for a leg: the best of the first such leg.
+    least_bad: OnceLock<LeastBad>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Options that are at hand from the beginning, the same for every search of a building.
@@ -92,6 +95,15 @@ pub struct Search<'a> {
 struct TriedLeg {
     option: Arc<GuidedOption>,
     cost_s: f64,
+    success: f64,
+}
+
+/// The best way out of the start for a leg for which none did well.
+#[derive(Clone, Copy, Debug)]
+struct LeastBad {
+    /// Its number among the ways, `None` for driving at once.
+    number: Option<usize>,
+    /// Share of the runs that came through.
     success: f64,
 }
 
@@ -356,8 +368,8 @@ impl<'a> Search<'a> {
             return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
         }
         // The guides of the direct way take longest: it does as the leg before it, however well that did.
-        let chosen =
-            self.chosen.get().or_else(|| self.least_bad.get().filter(|_| id == LegId::Direct)).copied();
+        let least_bad = || self.least_bad.get().filter(|_| id == LegId::Direct).map(|way| way.number);
+        let chosen = self.chosen.get().copied().or_else(least_bad);
         let again = chosen.flatten().and_then(|way| self.departures().get(way));
         if let Some(option) = again.and_then(|way| self.departing(candidate, way)) {
             return Ok(Arc::new(option));
@@ -385,7 +397,8 @@ impl<'a> Search<'a> {
     }
 
     /// The leg `candidate` with the first way out of the start that hardly ever fails, driving `at_once` before all others;
-    /// the cheapest if each fails at times. After one that does well the next legs from the start leave it likewise.
+    /// the cheapest if each fails at times. After one that does well the next legs from the start leave it likewise; if none
+    /// does, the best of them is tried first for the next leg.
     fn first_that_leaves(
         &self,
         candidate: &Candidate,
@@ -403,27 +416,34 @@ impl<'a> Search<'a> {
             let tried = if is_doubtful { self.tried_in(tried.option, DOUBTFUL_EPISODES) } else { tried };
             Some((tried, number))
         };
-        let mut all: Vec<Option<usize>> = (0..self.departures().len()).map(Some).collect();
-        // Where no way did well for another leg, the best of them then is enough for this one.
+        let all: Vec<Option<usize>> = (0..self.departures().len()).map(Some).collect();
+        // If no way did well for an earlier leg, the best of them is enough for this leg too, unless it does worse here.
         let least_bad = self.least_bad.get().copied();
-        all.sort_by_key(|way| Some(*way) != least_bad);
+        let before: Vec<Option<usize>> = least_bad.and_then(|way| way.number).map(Some).into_iter().collect();
+        let others: Vec<Option<usize>> = all.into_iter().filter(|way| !before.contains(way)).collect();
         let mut best: Option<(TriedLeg, Option<usize>)> = None;
         let mut is_settled = false;
         let side_by_side =
             |ways: &[Option<usize>]| -> Vec<_> { ways.par_iter().map(|&way| trying(way)).collect() };
-        let ways = std::iter::once(&[None][..]).chain(all.chunks(WAYS_AT_ONCE));
+        let ways = [&[None][..], &before].into_iter().chain(others.chunks(WAYS_AT_ONCE));
         for (tried, number) in ways.flat_map(side_by_side).flatten() {
-            is_settled = tried.success >= LEAVES_WELL;
+            let success = tried.success;
+            is_settled = success >= LEAVES_WELL;
             if is_settled || best.as_ref().is_none_or(|(best, _)| tried.cost_s < best.cost_s) {
                 best = Some((tried, number));
             }
-            if is_settled || Some(number) == least_bad {
+            let is_enough = |way: LeastBad| way.number == number && success >= way.success - LESS;
+            if is_settled || least_bad.is_some_and(is_enough) {
                 break;
             }
         }
         let Some((tried, number)) = best else { return at_once.map(Arc::new) };
         // Of a plan only one leg begins at the start, so that this is the same every time.
-        let _ = if is_settled { self.chosen.set(number) } else { self.least_bad.set(number) };
+        if is_settled {
+            let _ = self.chosen.set(number);
+        } else {
+            let _ = self.least_bad.set(LeastBad { number, success: tried.success });
+        }
         Ok(tried.option)
     }
 
@@ -596,166 +616,10 @@ fn state_near(states: &dyn StateAbstraction, point: Point) -> Option<StateId> {
         cols.map(move |col| Cell::new(col, row))
     })
     .filter_map(|cell| states.state_of(cell).map(|state| ((frame.center(cell) - point).norm(), cell, state)))
+    .filter(|(distance_m, ..)| *distance_m <= STATE_NEAR_M.max(1.5 * frame.resolution_m))
     .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     .map(|(_, _, state)| state)
 }
 
 #[cfg(test)]
-mod tests {
-    use sharp_drive::SuccessCount;
-
-    use super::*;
-    use crate::test_worlds::{HALL, RING, SEALED, along, straight, world};
-    use sharp_options::OptionKind;
-
-    fn names(options: &[Arc<GuidedOption>]) -> String {
-        options.iter().map(|option| option.id.to_string()).collect::<Vec<_>>().join(" ")
-    }
-
-    /// The cheapest plan for `query` as `settings` say, where `measured` knows what options cost.
-    fn plan(
-        (world, abstraction): &(World, Abstraction),
-        query: Query,
-        settings: SearchSettings,
-        measured: &dyn Fn(LegId) -> Option<SuccessEstimate>,
-    ) -> Option<Vec<Arc<GuidedOption>>> {
-        let method = Method { search: settings, ..Method::fast() };
-        let search = Search::new(world, abstraction, &method, &NoiseModel::nominal(), query, [], Seed(1));
-        search.expect("both ends have a state").plan(measured, &()).map(|(_, plan)| plan)
-    }
-
-    fn unmeasured(_: LegId) -> Option<SuccessEstimate> {
-        None
-    }
-
-    /// Round the block of the [`RING`].
-    fn round() -> Query {
-        Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) }
-    }
-
-    #[test]
-    fn a_hand_over_that_was_seen_to_fail_sends_the_plan_the_other_way_round() {
-        let (world, abstraction) = world(RING, OptionKind::Interface);
-        let method = Method::fast();
-        let search = Search::new(&world, &abstraction, &method, &NoiseModel::nominal(), round(), [], Seed(1));
-        let mut search = search.expect("both ends have a state");
-        let (_, first) = search.plan(&unmeasured, &()).expect("two ways lead round");
-        let ids = |options: &[Arc<GuidedOption>]| options.iter().map(|o| o.id).collect::<Vec<_>>();
-        for pair in ids(&first).windows(2) {
-            search.charge(pair[0], pair[1], 1000.0);
-        }
-        let (_, second) = search.plan(&unmeasured, &()).expect("the other way");
-        let before = ids(&first);
-        let kept = ids(&second).windows(2).any(|pair| before.windows(2).any(|joined| joined == pair));
-        assert!(!kept, "{} keeps a hand-over of {}", names(&second), names(&first));
-    }
-
-    #[test]
-    fn measured_costs_make_a_plan_change_its_way() {
-        let world = world(RING, OptionKind::Interface);
-        let settings = SearchSettings::default();
-        let first = plan(&world, round(), settings, &unmeasured).expect("two ways lead round");
-        let option = first.iter().find(|o| matches!(o.id, LegId::Option(_))).expect("an option").id;
-        let count = SuccessCount { episodes: 1000, successes: 1000 };
-        let slow = |id| (id == option).then_some(SuccessEstimate { count, mean_time_s: 500.0 });
-        let second = plan(&world, round(), settings, &slow).expect("the other way");
-        assert!(second.iter().all(|o| o.id != option), "{} uses the slow {option}", names(&second));
-        let settings = SearchSettings { cost_update: false, ..settings };
-        let third = plan(&world, round(), settings, &slow).expect("the first way");
-        assert_eq!(names(&third), names(&first), "without the update nothing flows back");
-    }
-
-    /// A corridor of 1.6 m with a corner, and regions on both sides of it.
-    const CORNER: &str = "
-        ###############
-        #.............#
-        #.............#
-        #..0..1.......#
-        #.............#
-        #########.....#
-        #########.....#
-        #########.....#
-        #########..2..#
-        #########.....#
-        #########.....#
-        ###############";
-
-    #[test]
-    fn a_turn_that_is_too_sharp_is_better_than_no_plan() {
-        let world = world(CORNER, OptionKind::Centroid);
-        let query = Query { start: Pose::new(1.2, 3.2, 0.0), goal: Pose::new(4.6, 1.2, 0.0) };
-        for smooth_turn_rad in [75.0_f64.to_radians(), 0.01] {
-            let settings = SearchSettings { smooth_turn_rad, ..SearchSettings::default() };
-            assert!(
-                plan(&world, query, settings, &unmeasured).is_some(),
-                "no plan where turns of {smooth_turn_rad} rad are smooth"
-            );
-        }
-    }
-
-    /// A corridor of 2 m with a dead end off it, in which the region of the middle state lies.
-    const ALCOVE: &str = "
-        ###########################
-        ###########.....###########
-        ###########.....###########
-        ###########..1..###########
-        ###########.....###########
-        ###########.....###########
-        #.........................#
-        #.........................#
-        #...0.................2...#
-        #.........................#
-        #.........................#
-        ###########################";
-
-    #[test]
-    fn a_centroid_from_which_nobody_gets_on_is_passed_by() {
-        let world = world(ALCOVE, OptionKind::Centroid);
-        let query = Query { start: Pose::new(1.0, 1.4, 0.0), goal: Pose::new(9.8, 1.4, 0.0) };
-        let names = |bypasses| {
-            let price = PriceRule::Profile;
-            let settings = SearchSettings { bypasses, price, ..SearchSettings::default() };
-            names(&plan(&world, query, settings, &unmeasured).expect("a way"))
-        };
-        assert_eq!(names(true), "first:0 c:0-1-2 last:2");
-        assert_eq!(
-            names(false),
-            "first:0 c:0-1 c:1-2 last:2",
-            "the paper's options turn round in the dead end"
-        );
-    }
-
-    #[test]
-    fn guides_from_earlier_problems_are_kept() {
-        let (world, abstraction) = world(HALL, OptionKind::Centroid);
-        let spec = abstraction.options.options()[0];
-        let ends = |id| abstraction.options.endpoint(id).center;
-        let (from, to) = (ends(spec.initiation), ends(spec.termination));
-        let known = straight((from.x, from.y), (to.x, to.y));
-        let guides = [(LegId::Option(spec.id), known.clone())];
-        let method = Method::fast();
-        let search =
-            Search::new(&world, &abstraction, &method, &NoiseModel::nominal(), along(), guides, Seed(1));
-        let (_, options) = search.expect("both ends have a state").plan(&unmeasured, &()).expect("a way");
-        let option = options.iter().find(|option| option.id == LegId::Option(spec.id)).expect("on the way");
-        assert_eq!(option.guide, known, "planned again");
-    }
-
-    #[test]
-    fn sealed_rooms_have_no_plan_and_walls_have_no_state() {
-        for kind in [OptionKind::Centroid, OptionKind::Interface] {
-            let world = world(SEALED, kind);
-            let through = Query { start: Pose::new(2.0, 1.4, 0.0), goal: Pose::new(6.0, 1.4, 0.0) };
-            let none = plan(&world, through, SearchSettings::default(), &unmeasured);
-            assert!(none.is_none(), "{kind:?}: through a wall");
-            let outside = Pose::new(-5.0, 1.0, 0.0);
-            let method = Method::fast();
-            let placed = |query| {
-                Search::new(&world.0, &world.1, &method, &NoiseModel::nominal(), query, [], Seed(1))
-                    .map(|_| ())
-            };
-            assert_eq!(placed(Query { start: outside, ..through }), Err(Unplaced::Start), "{kind:?}");
-            assert_eq!(placed(Query { goal: outside, ..through }), Err(Unplaced::Goal), "{kind:?}");
-        }
-    }
-}
+mod tests;

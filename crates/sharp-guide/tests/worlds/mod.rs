@@ -60,6 +60,8 @@ pub(crate) fn along() -> Problem {
 /// A robot of the Husky's size in a drawing, with options between the regions.
 #[derive(Debug)]
 pub(crate) struct Drawn {
+    #[allow(dead_code, reason = "not every test looks at cells")]
+    pub(crate) grid: OccupancyGrid,
     geometry: Arc<dyn RobotGeometry>,
     inflated: Vec<InflatedRobot>,
     pub(crate) space: OptionSpace,
@@ -87,7 +89,12 @@ impl Drawn {
         let geometry: Arc<dyn RobotGeometry> = Arc::new(FootprintChecker::new(&grid, footprint));
         let inflated = inflated_robots(&geometry, 0.0);
         let (states, options) = (Arc::new(states), Arc::new(options));
-        Self { geometry, inflated, space: OptionSpace { states, options, rule: AllowedRule::default() } }
+        Self {
+            grid,
+            geometry,
+            inflated,
+            space: OptionSpace { states, options, rule: AllowedRule::default() },
+        }
     }
 
     /// The robot, with its margins.

@@ -48,7 +48,7 @@ pub(super) fn ring_corridor(plan: &mut Blueprint, rng: &mut Stream) {
     plan.outline(core, wall);
     divide(plan, rng, core.shrunk(wall), 2);
     let door = door_m(rng);
-    let start = rng.random_range(0.4..=core.height() - door - 0.4);
+    let start = rng.random_range(0.4..=(core.height() - door - 0.4).max(0.4));
     let x = if rng.random_bool(0.5) { core.x0 } else { core.x1 - wall };
     let (y0, y1) = (core.y0 + start, core.y0 + start + door);
     plan.clear(Rect { x0: x - 0.05, x1: x + wall + 0.05, y0, y1 });
@@ -124,7 +124,7 @@ fn row_of_rooms(plan: &mut Blueprint, rng: &mut Stream, area: Rect, side: Corrid
             plan.fill(Rect { x0: x, x1: x + wall, ..area });
             if rng.random_bool(0.25) && area.height() > 2.5 {
                 let door = door_m(rng);
-                let start = area.y0 + rng.random_range(0.4..=area.height() - door - 0.4);
+                let start = area.y0 + rng.random_range(0.4..=(area.height() - door - 0.4).max(0.4));
                 plan.clear(Rect { x0: x - 0.05, x1: x + wall + 0.05, y0: start, y1: start + door });
             }
         }

@@ -19,14 +19,7 @@ pub(super) fn text(lines: &[&PaperLine]) -> String {
         lines.len(),
         rows.len()
     );
-    if let Some(line) = lines.last() {
-        let (cpu, cores) = (&line.machine.cpu, line.machine.cores);
-        _ = writeln!(
-            text,
-            "Machine: {cpu}, {cores} core{}, shared with other work at times. Seed 1, one trial.",
-            if cores == 1 { "" } else { "s" }
-        );
-    }
+    text += &machines(lines);
     let of = |method: &str| -> Vec<&PaperLine> {
         lines.iter().copied().filter(|line| line.row.method == method).collect()
     };
@@ -40,6 +33,22 @@ pub(super) fn text(lines: &[&PaperLine]) -> String {
     text += &baselines(&of("rrt"), &of("sac"));
     text += &missing(lines, &rows);
     text
+}
+
+/// On what how many of `lines` were measured.
+fn machines(lines: &[&PaperLine]) -> String {
+    let mut counts: BTreeMap<(&str, usize), usize> = BTreeMap::new();
+    for PaperLine { machine, .. } in lines {
+        *counts.entry((&machine.cpu, machine.cores)).or_default() += 1;
+    }
+    let one = |(&(cpu, cores), rows): (&(&str, usize), &usize)| {
+        format!("{rows} rows on {cores} core{} ({cpu})", if cores == 1 { "" } else { "s" })
+    };
+    let all: Vec<String> = counts.iter().map(one).collect();
+    if all.is_empty() {
+        return String::new();
+    }
+    format!("{}; shared with other work at times. Seed 1, one trial.\n", all.join(", "))
 }
 
 /// What was measured of the paper's protocol, or of the one with a tuned learner.
