@@ -26,15 +26,25 @@ pub(crate) fn plan_guide(
     match settings.planner {
         PlannerKind::ClearanceSearch => {
             let searched = searched_guide(request, robot, settings, &mut Drafts::default());
-            let may_sample = settings.sampling.budget.iterations > 0;
-            if searched.is_ok() || !may_sample {
-                searched
-            } else {
-                sample_guide(request, robot, settings, rng)
-            }
+            or_sampled(searched, request, robot, settings, rng)
         }
         PlannerKind::LearnAndLink => sample_guide(request, robot, settings, rng),
     }
+}
+
+/// What was `searched`, or a guide by samples where there is none and samples are allowed.
+///
+/// # Errors
+/// Says what the search or else the sampling failed of.
+pub(crate) fn or_sampled(
+    searched: Result<GuidePath, NoGuide>,
+    request: &GuideRequest<'_>,
+    robot: &GuideRobot<'_>,
+    settings: &GuideSettings,
+    rng: &mut Stream,
+) -> Result<GuidePath, NoGuide> {
+    let may_sample = settings.sampling.budget.iterations > 0;
+    if searched.is_ok() || !may_sample { searched } else { sample_guide(request, robot, settings, rng) }
 }
 
 /// Smoothed ways of one request, by outline and attempt: robots that differ in how they steer share them.
@@ -105,7 +115,7 @@ pub(crate) fn searched_guide<'a>(
 ///
 /// # Errors
 /// If the sampling planner finds nothing within its budget, which may be none.
-pub(crate) fn sample_guide(
+fn sample_guide(
     request: &GuideRequest<'_>,
     robot: &GuideRobot<'_>,
     settings: &GuideSettings,

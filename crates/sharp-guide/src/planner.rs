@@ -7,7 +7,7 @@ use sharp_space::{Pose, Stream};
 
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
-use crate::plan::{Drafts, plan_guide, sample_guide, searched_guide};
+use crate::plan::{Drafts, or_sampled, plan_guide, searched_guide};
 use crate::request::{GuideRequest, NoGuide};
 use crate::settings::{GuideSettings, PlannerKind};
 
@@ -49,8 +49,7 @@ impl GuidePlanner for ClearanceSearch {
         let mut robots = robot.inflated_at(start).filter(|_| settings.margins);
         let Some(widest) = robots.next() else { return plan_guide(request, robot, &settings, rng) };
         let searched = largest_margin(request, widest, &robots.collect::<Vec<_>>(), &settings);
-        let may_sample = settings.sampling.budget.iterations > 0;
-        if searched.is_ok() || !may_sample { searched } else { sample_guide(request, robot, &settings, rng) }
+        or_sampled(searched, request, robot, &settings, rng)
     }
 }
 

@@ -58,21 +58,14 @@ fn told_or_not(guide: &Result<GuidePath, NoGuide>) -> String {
     guide.as_ref().map_or_else(|reason| format!("none: {reason}"), told)
 }
 
-/// A robot that turns in place and a car, on one map.
-struct Robots {
-    geometry: [Arc<dyn RobotGeometry>; 2],
-}
-
-const RADII_M: [f64; 2] = [0.0, 0.4];
-
-impl Robots {
-    fn new(grid: &OccupancyGrid) -> Self {
-        let geometry = [(0.5, 0.335), (0.16, 0.11)].map(|(half_length_m, half_width_m)| {
+/// A robot that turns in place and a car, on one map, with their turning radii in metres.
+fn robots(grid: &OccupancyGrid) -> [(&'static str, Arc<dyn RobotGeometry>, f64); 2] {
+    [("husky", 0.5, 0.335, 0.0), ("limo", 0.16, 0.11, 0.4)].map(
+        |(name, half_length_m, half_width_m, radius_m)| {
             let outline = Footprint::rectangle(half_length_m, half_width_m).expect("a sound outline");
-            Arc::new(FootprintChecker::new(grid, outline)) as Arc<dyn RobotGeometry>
-        });
-        Self { geometry }
-    }
+            (name, Arc::new(FootprintChecker::new(grid, outline)) as Arc<dyn RobotGeometry>, radius_m)
+        },
+    )
 }
 
 /// A place in which the robot fits at a random heading.
@@ -93,15 +86,13 @@ fn guides_on_floor_plans() {
     let mut lines = String::new();
     for (number, kind) in FloorplanKind::ALL.into_iter().enumerate() {
         let grid = generate(kind, 15.0, 0.067, &mut Seed(9).stream("map", number as u64));
-        let robots = Robots::new(&grid);
-        for (name, (geometry, radius_m)) in ["husky", "limo"].iter().zip(robots.geometry.iter().zip(RADII_M))
-        {
-            let inflated = inflated_robots(geometry, radius_m);
+        for (name, geometry, radius_m) in robots(&grid) {
+            let inflated = inflated_robots(&geometry, radius_m);
             let robot =
-                GuideRobot { geometry: &**geometry, steering: Steering::of(radius_m), inflated: &inflated };
+                GuideRobot { geometry: &*geometry, steering: Steering::of(radius_m), inflated: &inflated };
             let mut rng = Seed(3).stream(name, number as u64);
             for ask in 0..5 {
-                let (start, goal) = (pose(&**geometry, &mut rng), pose(&**geometry, &mut rng));
+                let (start, goal) = (pose(&*geometry, &mut rng), pose(&*geometry, &mut rng));
                 let heading = |pose: &Pose, bit: u32| (ask & bit != 0).then_some(pose.heading);
                 let request = GuideRequest {
                     start: GuideEnd { position: start.position, heading: heading(&start, 1) },
@@ -129,14 +120,13 @@ fn guides_on_floor_plans() {
 fn routes_and_samples() {
     let mut lines = String::new();
     let grid = generate(FloorplanKind::Gap, 15.0, 0.067, &mut Seed(4).stream("map", 0));
-    let robots = Robots::new(&grid);
-    for (name, (geometry, radius_m)) in ["husky", "limo"].iter().zip(robots.geometry.iter().zip(RADII_M)) {
-        let inflated = inflated_robots(geometry, radius_m);
+    for (name, geometry, radius_m) in robots(&grid) {
+        let inflated = inflated_robots(&geometry, radius_m);
         let robot =
-            GuideRobot { geometry: &**geometry, steering: Steering::of(radius_m), inflated: &inflated };
+            GuideRobot { geometry: &*geometry, steering: Steering::of(radius_m), inflated: &inflated };
         let mut rng = Seed(5).stream(name, 0);
         for ask in 0..3 {
-            let (start, goal) = (pose(&**geometry, &mut rng), pose(&**geometry, &mut rng));
+            let (start, goal) = (pose(&*geometry, &mut rng), pose(&*geometry, &mut rng));
             for route in ridge_routes(&robot, start, (goal.position, Some(goal.heading))) {
                 writeln!(lines, "{name} {ask} along the ridge: {}", told_or_not(&route)).expect("a string");
             }
@@ -159,12 +149,11 @@ fn routes_and_samples() {
 fn ways_out_of_tight_places_and_gaps() {
     let mut lines = String::new();
     let grid = generate(FloorplanKind::Rooms, 15.0, 0.067, &mut Seed(9).stream("map", 0));
-    let robots = Robots::new(&grid);
-    for (name, (geometry, radius_m)) in ["husky", "limo"].iter().zip(robots.geometry.iter().zip(RADII_M)) {
-        let robot = GuideRobot::new(&**geometry, Steering::of(radius_m));
+    for (name, geometry, radius_m) in robots(&grid) {
+        let robot = GuideRobot::new(&*geometry, Steering::of(radius_m));
         let mut rng = Seed(6).stream(name, 0);
         for _ in 0..12 {
-            let start = pose(&**geometry, &mut rng);
+            let start = pose(&*geometry, &mut rng);
             let is_tight = is_tight(&robot, start);
             let across = (0..8).map(|turn| std::f64::consts::PI * f64::from(turn) / 8.0);
             let gap_m = gap_m(geometry.clearance(), start.position, across);

@@ -416,11 +416,11 @@ impl<'a> Search<'a> {
             let tried = if is_doubtful { self.tried_in(tried.option, DOUBTFUL_EPISODES) } else { tried };
             Some((tried, number))
         };
-        let all: Vec<Option<usize>> = (0..self.departures().len()).map(Some).collect();
         // If no way did well for an earlier leg, the best of them is enough for this leg too, unless it does worse here.
         let least_bad = self.least_bad.get().copied();
         let before: Vec<Option<usize>> = least_bad.and_then(|way| way.number).map(Some).into_iter().collect();
-        let others: Vec<Option<usize>> = all.into_iter().filter(|way| !before.contains(way)).collect();
+        let others = (0..self.departures().len()).map(Some).filter(|way| !before.contains(way));
+        let others: Vec<Option<usize>> = others.collect();
         let mut best: Option<(TriedLeg, Option<usize>)> = None;
         let mut is_settled = false;
         let side_by_side =
