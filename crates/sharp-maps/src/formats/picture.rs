@@ -40,6 +40,9 @@ pub(crate) fn decode(file: &str, bytes: &[u8]) -> Result<GreyImage, MapError> {
     let image = match format_of(bytes) {
         Some(ImageFormat::Pnm) => decode_pnm(file, bytes, &mut warning)?,
         Some(format) => {
+            if format == ImageFormat::Png {
+                check_palette(file, bytes)?;
+            }
             let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
             reader.limits(limits());
             let decoder = reader.into_decoder().map_err(|e| MapError::image(file, reason(&e)))?;
@@ -59,6 +62,26 @@ fn format_of(bytes: &[u8]) -> Option<ImageFormat> {
         [b'B', b'M', ..] => Some(ImageFormat::Bmp),
         _ => None,
     }
+}
+
+/// Refuses a palette (chunk `PLTE`) that does not hold whole colours.
+///
+/// The standard asks for three bytes a colour (ISO/IEC 15948, 11.2.2), and the decoder of png 0.18.1 panics on others.
+fn check_palette(file: &str, png: &[u8]) -> Result<(), MapError> {
+    const SIGNATURE: usize = 8;
+    const CHECKSUM: usize = 4;
+    let mut rest = png.get(SIGNATURE..).unwrap_or_default();
+    while let Some((&[a, b, c, d, ref name @ ..], data)) = rest.split_first_chunk::<8>() {
+        let length = u32::from_be_bytes([a, b, c, d]) as usize;
+        if name == b"PLTE" && !length.is_multiple_of(3) {
+            return Err(MapError::image(
+                file,
+                format!("its palette has {length} bytes, must have 3 for each colour"),
+            ));
+        }
+        rest = data.get(length.saturating_add(CHECKSUM)..).unwrap_or_default();
+    }
+    Ok(())
 }
 
 fn limits() -> Limits {
@@ -225,6 +248,23 @@ mod tests {
         }
         let message = refusal(&Png::new((8192, 8192), 16, RGBA, &[0]).bytes());
         assert!(message.contains("needs more than 268435456 bytes"), "{message}");
+    }
+
+    #[test]
+    fn palettes_of_broken_colors_are_refused() {
+        for length in 1..=10 {
+            let mut png = Png::new((2, 1), 8, PALETTE, &[0, 0, 0]);
+            png.extra.push((b"gAMA", vec![0, 0, 0xb1, 0x8f]));
+            png.extra.push((b"PLTE", vec![7; length]));
+            let decoded = decode("image.png", &png.bytes());
+            if length % 3 == 0 {
+                decoded.unwrap_or_else(|e| panic!("{length} bytes: {e}"));
+                continue;
+            }
+            let message = decoded.expect_err("not whole colors").to_string();
+            let wanted = format!("its palette has {length} bytes, must have 3 for each colour");
+            assert!(message.contains(&wanted), "{length} bytes: {message}");
+        }
     }
 
     #[test]
