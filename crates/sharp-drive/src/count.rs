@@ -38,60 +38,118 @@ impl SuccessCount {
         if self.episodes == 0 { 0.0 } else { f64::from(self.successes) / f64::from(self.episodes) }
     }
 
-    /// The lower end of the 95 % Wilson score interval; 0 before the first trial.
+    /// The lower end of the 95 % interval; 0 before the first trial. See [`wilson95`].
     #[must_use]
     pub fn lower95(&self) -> f64 {
-        self.wilson().0
+        self.interval95().0
     }
 
-    /// The upper end of the 95 % Wilson score interval; 1 before the first trial.
+    /// The upper end of the 95 % interval; 1 before the first trial. See [`wilson95`].
     #[must_use]
     pub fn upper95(&self) -> f64 {
-        self.wilson().1
+        self.interval95().1
     }
 
-    /// Half the width of the 95 % Wilson score interval; one half before the first trial.
+    fn interval95(&self) -> (f64, f64) {
+        wilson95(self.rate(), f64::from(self.episodes))
+    }
+
+    /// Half the width of the 95 % Wilson score interval without the correction of [`wilson95`], in which it is easier to say how many
+    /// trials a width needs; one half before the first trial.
     #[must_use]
     pub fn half_width95(&self) -> f64 {
-        let (lower, upper) = self.wilson();
-        0.5 * (upper - lower)
-    }
-
-    fn wilson(&self) -> (f64, f64) {
-        wilson95(self.rate(), f64::from(self.episodes))
+        if self.episodes == 0 {
+            return 0.5;
+        }
+        let (n, p, z2) = (f64::from(self.episodes), self.rate(), Z_95 * Z_95);
+        Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt() / (1.0 + z2 / n)
     }
 }
 
-/// The 95 % Wilson score interval of a share `rate` that was counted on `episodes` trials, which need not be a whole number;
-/// from 0 to 1 without any.
+/// The 95 % Wilson score interval, with continuity correction, of a share `rate` that was counted on `episodes` trials, which need not
+/// be a whole number; from 0 to 1 without any.
 ///
-/// E. B. Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", 1927.
+/// The correction makes it a promise: the interval holds the truth at least 95 times in 100 whatever the truth is, where the
+/// interval without it does so on average over all truths (between 92 and 97 times for 200 trials).
+///
+/// E. B. Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", 1927; R. G. Newcombe, "Two-sided confidence
+/// intervals for the single proportion: comparison of seven methods", 1998, method 4.
 #[must_use]
 pub fn wilson95(rate: f64, episodes: f64) -> (f64, f64) {
     if episodes <= 0.0 {
         return (0.0, 1.0);
     }
-    let (n, p) = (episodes, rate);
-    let z2 = Z_95 * Z_95;
-    let center = p + z2 / (2.0 * n);
-    let half = Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
-    let scale = 1.0 + z2 / n;
-    (((center - half) / scale).max(0.0), ((center + half) / scale).min(1.0))
+    // The upper end is the lower end for failures.
+    (lower_end(rate, episodes), 1.0 - lower_end(1.0 - rate, episodes))
+}
+
+/// The lower end of [`wilson95`].
+fn lower_end(rate: f64, episodes: f64) -> f64 {
+    if rate <= 0.0 {
+        return 0.0;
+    }
+    let (n, p, z2) = (episodes, rate, Z_95 * Z_95);
+    let square = z2 - 2.0 - 1.0 / n + 4.0 * p * (n * (1.0 - p) + 1.0);
+    ((2.0 * n * p + z2 - 1.0 - Z_95 * square.max(0.0).sqrt()) / (2.0 * (n + z2))).max(0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Newcombe's table I, method 4.
     #[test]
-    fn wilson_intervals_match_known_values() {
-        for (successes, episodes, lower, upper) in
-            [(20, 20, 0.8389, 1.0), (199, 200, 0.9722, 0.9991), (0, 10, 0.0, 0.2775), (5, 10, 0.2366, 0.7634)]
-        {
+    fn intervals_match_published_values() {
+        for (successes, episodes, lower, upper) in [
+            (81, 263, 0.2535, 0.3682),
+            (15, 148, 0.0598, 0.1644),
+            (0, 20, 0.0, 0.2005),
+            (1, 29, 0.0018, 0.1963),
+        ] {
             let count = SuccessCount { episodes, successes };
-            assert!((count.lower95() - lower).abs() < 1e-4, "{successes}/{episodes}: {}", count.lower95());
-            assert!((count.upper95() - upper).abs() < 1e-4, "{successes}/{episodes}: {}", count.upper95());
+            assert!((count.lower95() - lower).abs() < 6e-5, "{successes}/{episodes}: {}", count.lower95());
+            assert!((count.upper95() - upper).abs() < 6e-5, "{successes}/{episodes}: {}", count.upper95());
         }
+    }
+
+    /// The chances of 0, 1, ... successes in `episodes` trials.
+    fn binomial(episodes: u32, rate: f64) -> Vec<f64> {
+        let mut chances = vec![1.0];
+        for _ in 0..episodes {
+            let before = |k: usize| chances.get(k).copied().unwrap_or(0.0);
+            let after = |k: usize| {
+                let missed = before(k) * (1.0 - rate);
+                missed + if k == 0 { 0.0 } else { before(k - 1) * rate }
+            };
+            chances = (0..=chances.len()).map(after).collect();
+        }
+        chances
+    }
+
+    #[test]
+    fn intervals_hold_the_truth_at_least_95_times_in_100() {
+        for episodes in [24, 48, 200, 500] {
+            for permille in (300..1000).step_by(7).chain([995, 998, 999]) {
+                let truth = f64::from(permille) / 1000.0;
+                let chances = binomial(episodes, truth);
+                let holds = |successes: u32| {
+                    let count = SuccessCount { episodes, successes };
+                    (count.lower95()..=count.upper95()).contains(&truth)
+                };
+                let held: f64 = (0..=episodes).filter(|&k| holds(k)).map(|k| chances[k as usize]).sum();
+                assert!(held >= 0.95, "a rate of {truth} on {episodes} trials is held {held} of the time");
+            }
+        }
+    }
+
+    #[test]
+    fn half_widths_are_those_of_the_interval_without_correction() {
+        // (1.0 - 0.8389) / 2, (0.9991 - 0.9722) / 2, (0.7634 - 0.2366) / 2.
+        for (successes, episodes, half) in [(20, 20, 0.0806), (199, 200, 0.01345), (5, 10, 0.2634)] {
+            let width = SuccessCount { episodes, successes }.half_width95();
+            assert!((width - half).abs() < 1e-4, "{successes}/{episodes}: {width}");
+        }
+        assert_eq!(SuccessCount::default().half_width95(), 0.5, "nothing is known");
     }
 
     #[test]
