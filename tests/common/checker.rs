@@ -58,12 +58,12 @@ fn radius_m(outline: &Outline) -> f64 {
 pub(crate) fn deepest_m(grid: &OccupancyGrid, outline: &Outline, pose: Pose) -> f64 {
     let frame = grid.frame();
     let side_m = frame.resolution_m;
-    let near = |at_m: f64, from_m: f64, count: usize| {
-        let at = (at_m - from_m) / side_m;
-        (at - 1.0 / side_m).max(0.0) as usize..((at + 1.0 / side_m).max(0.0) as usize).min(count)
-    };
     // No corner of outline and cell is further away together.
     let reach_m = side_m + radius_m(outline);
+    let near = |at_m: f64, from_m: f64, count: usize| {
+        let (at, reach) = ((at_m - from_m) / side_m, reach_m / side_m);
+        (at - reach).max(0.0) as usize..((at + reach + 1.0).max(0.0) as usize).min(count)
+    };
     let origin = frame.origin.position;
     let mut deepest_m = f64::NEG_INFINITY;
     for row in near(pose.position.y, origin.y, frame.height) {

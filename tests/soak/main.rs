@@ -13,6 +13,7 @@ mod bounds;
 mod endurance;
 mod mutations;
 mod plans;
+mod suite;
 mod unsolvable;
 mod worlds;
 

@@ -22,7 +22,7 @@ const ALLOWED_M: f64 = 0.002;
 const QUERIES: u64 = 25;
 
 /// What is wrong with the guides of a plan.
-fn fault(
+pub(crate) fn fault(
     grid: &OccupancyGrid,
     robot: &RobotModel,
     outline: &Outline,
