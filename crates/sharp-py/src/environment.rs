@@ -88,20 +88,35 @@ impl Tasks {
     }
 
     /// Begins an episode in slot `index`; with a seed its episodes begin anew. Returns the observation.
-    fn reset<'py>(&self, py: Python<'py>, index: usize, seed: Option<u64>) -> Bound<'py, PyBytes> {
+    fn reset<'py>(
+        &self,
+        py: Python<'py>,
+        index: usize,
+        seed: Option<u64>,
+    ) -> Result<Bound<'py, PyBytes>, Raised> {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        let slot = &mut slots[index];
+        let count = slots.len();
+        let Some(slot) = slots.get_mut(index) else {
+            return Err(Raised::new("USAGE", format!("slot is {index}, expected below {count}")));
+        };
         if let Some(seed) = seed {
             slot.stream = Stream::seed_from_u64(seed);
         }
         slot.task.reset(&mut slot.stream, &mut slot.observation);
-        to_bytes(py, &slot.observation)
+        Ok(to_bytes(py, &slot.observation))
     }
 
     /// One action in each slot; those in `begins` (a byte a slot, 1 for yes) begin an episode instead.
     fn step<'py>(&self, py: Python<'py>, actions: &[u8], begins: &[u8]) -> Result<Answer<'py>, Raised> {
         let actions = from_bytes(actions);
         let wanted = begins.len() * PolicyInterface::ACTION_LEN;
+        // A NaN would stay in what the robot remembers of its last action.
+        if let Some(number) = actions.iter().find(|number| !number.is_finite()) {
+            return Err(Raised::new(
+                "USAGE",
+                format!("an action is {number}, expected numbers from -1 to 1"),
+            ));
+        }
         let result = py.detach(|| {
             let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
             if actions.len() != wanted || begins.len() != slots.len() {

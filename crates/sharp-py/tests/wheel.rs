@@ -70,6 +70,17 @@ fn environments_pass_the_checks_of_gymnasium() {
     }
 }
 
+/// `SHARP_SOAK=1` tries 100,000 calls.
+#[test]
+fn whatever_arguments_are_given_python_raises_an_error_of_its_own() {
+    let share = std::env::var("SHARP_SOAK").ok().and_then(|share| share.parse::<f64>().ok());
+    let calls = share.map_or(1_500, |share| (1e5 * share) as u64).to_string();
+    if let Some(said) = said("tests/check_arguments.py", &[Path::new(&calls)]) {
+        println!("soak: {}", said.lines().next().unwrap_or_default());
+        assert!(said.ends_with("all checks passed\n"), "{said}");
+    }
+}
+
 #[test]
 fn the_example_draws_its_pictures() {
     let folder = tempfile::tempdir().expect("a folder");
