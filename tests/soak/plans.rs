@@ -1,7 +1,7 @@
 //! Group 15: every guide of every plan, looked at four times as finely as the planner looks, by a checker of its own.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use sharp_guide::{GuidedOption, join_guides};
@@ -66,7 +66,7 @@ pub(crate) fn fault(
 fn no_plan_leads_through_an_obstacle_or_round_a_bend_that_is_too_tight() {
     let since = Instant::now();
     let wanted = cases(100, 1_000_000);
-    let (tried, planned) = (AtomicU64::new(0), AtomicU64::new(0));
+    let (tried, planned, slowest_ms) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
     let faults: Vec<String> = (0..wanted.div_ceil(QUERIES))
         .into_par_iter()
         .flat_map_iter(|number| {
@@ -80,10 +80,11 @@ fn no_plan_leads_through_an_obstacle_or_round_a_bend_that_is_too_tight() {
             for _ in 0..QUERIES {
                 let Some(query) = query(&world, &mut rng) else { break };
                 tried.fetch_add(1, Ordering::Relaxed);
+                let begun = Instant::now();
                 let search = Search::new(&world, &abstraction, &method, &noise, query, [], Seed(number));
-                let Some((_, plan)) = search.ok().and_then(|mut search| search.plan(&|_| None, &())) else {
-                    continue;
-                };
+                let plan = search.ok().and_then(|mut search| search.plan(&|_| None, &()));
+                slowest_ms.fetch_max(begun.elapsed().as_millis() as u64, Ordering::Relaxed);
+                let Some((_, plan)) = plan else { continue };
                 planned.fetch_add(1, Ordering::Relaxed);
                 let joined = join_guides(plan, query.start, &world.guide_robot(), &method.search.guide);
                 if let Some(fault) = fault(&grid, &robot, &outline, &joined) {
@@ -97,7 +98,12 @@ fn no_plan_leads_through_an_obstacle_or_round_a_bend_that_is_too_tight() {
     told(
         "guides keep clear of obstacles",
         planned,
-        &format!("{} faults, {} without a plan", faults.len(), tried - planned),
+        &format!(
+            "{} faults, {} without a plan, the slowest {:.2} s",
+            faults.len(),
+            tried - planned,
+            Duration::from_millis(slowest_ms.into_inner()).as_secs_f64()
+        ),
         since,
     );
     assert!(faults.is_empty(), "{} of {planned}: {:#?}", faults.len(), &faults[..faults.len().min(10)]);

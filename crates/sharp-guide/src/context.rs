@@ -246,12 +246,8 @@ impl<'a> GuideContext<'a> {
             }
         }
         let poses = guide.poses();
-        let radius_m = self.robot.steering.radius_m();
-        for pair in poses.windows(2) {
-            let turn = pair[0].heading.turn_to(pair[1].heading).abs();
-            if turn * radius_m > CURVATURE_SLACK * pair[0].distance_m(&pair[1]) {
-                return Err(NoGuide::Bend(pair[0].position));
-            }
+        if let Some(place) = tight_bend(guide, self.robot.steering.radius_m()) {
+            return Err(NoGuide::Bend(place));
         }
         // The ends are given, not chosen.
         match poses[1..poses.len() - 1].iter().find(|pose| !self.is_allowed(pose.position)) {
@@ -268,4 +264,13 @@ impl<'a> GuideContext<'a> {
             .cell_at(point)
             .is_some_and(|cell| (self.request.allowed)(cell))
     }
+}
+
+/// The first place where `guide` is too tight a bend for a robot that turns on `radius_m`.
+pub(crate) fn tight_bend(guide: &GuidePath, radius_m: f64) -> Option<Point> {
+    let is_tight = |pair: &&[Pose]| {
+        let turn = pair[0].heading.turn_to(pair[1].heading).abs();
+        turn * radius_m > CURVATURE_SLACK * pair[0].distance_m(&pair[1])
+    };
+    guide.poses().windows(2).find(is_tight).map(|pair| pair[0].position)
 }

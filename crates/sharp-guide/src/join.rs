@@ -12,6 +12,7 @@ use sharp_options::Endpoint;
 use sharp_rbvd::StateId;
 use sharp_space::{Cell, Heading, Point, Pose};
 
+use crate::context::tight_bend;
 use crate::gap::narrowest_gap_m;
 use crate::guided_option::GuidedOption;
 use crate::inflate::GuideRobot;
@@ -95,12 +96,15 @@ fn joined(
     let widest_m = robot.inflated_at(Some(start)).map(|robot| inscribed_m(&robot)).fold(0.0, f64::max);
     let gap_m = narrowest_gap_m(robot.geometry.clearance(), &way, widest_m);
     let mut fitting = robot.inflated_at(Some(start)).filter(|robot| 2.0 * inscribed_m(robot) <= gap_m);
-    let (path, cuts) = fitting.find_map(|inflated| {
+    fitting.find_map(|inflated| {
         let path = smooth_guide((&way, &discs), &request, &inflated, settings).ok()?;
-        cuts(options, &path).map(|cuts| (path, cuts))
-    })?;
-    let pieces = cuts.windows(2).map(|ends| piece(&path, ends[0], ends[1], settings.spacing_m));
-    pieces.collect()
+        let cuts = cuts(options, &path)?;
+        let pieces = cuts.windows(2).map(|ends| piece(&path, ends[0], ends[1], settings.spacing_m));
+        let pieces: Vec<GuidePath> = pieces.collect::<Option<_>>()?;
+        // The chords of a piece lie between those of the whole path and can be shorter in a bend.
+        let is_tight = |piece: &GuidePath| tight_bend(piece, robot.steering.radius_m()).is_some();
+        (!pieces.iter().any(is_tight)).then_some(pieces)
+    })
 }
 
 /// The direction in which `option` should arrive, where it ends at a goal that asks for one.

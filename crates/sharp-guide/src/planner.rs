@@ -26,6 +26,12 @@ pub trait GuidePlanner: Debug + Send + Sync {
         robot: &GuideRobot<'_>,
         rng: &mut Stream,
     ) -> Result<GuidePath, NoGuide>;
+
+    /// A planner that gives up sooner, for a first look at many options: what it finds this one finds too. `None`, the
+    /// default, if there is none.
+    fn hasty(&self) -> Option<Box<dyn GuidePlanner>> {
+        None
+    }
 }
 
 /// Search over cells that prefers clearance, then smoothing; Learn and Link where that fails.
@@ -50,6 +56,12 @@ impl GuidePlanner for ClearanceSearch {
         let Some(widest) = robots.next() else { return plan_guide(request, robot, &settings, rng) };
         let searched = largest_margin(request, widest, &robots.collect::<Vec<_>>(), &settings);
         or_sampled(searched, request, robot, &settings, rng)
+    }
+
+    /// The same without samples.
+    fn hasty(&self) -> Option<Box<dyn GuidePlanner>> {
+        let settings = self.settings.unsampled();
+        (settings != self.settings).then(|| Box::new(Self { settings }) as _)
     }
 }
 

@@ -60,6 +60,10 @@ const LEAVES_WELL: f64 = 0.98;
 pub struct Search<'a> {
     world: &'a World,
     guides: &'a dyn GuidePlanner,
+    /// Gives up on a guide sooner than `guides`.
+    hasty: Option<Box<dyn GuidePlanner>>,
+    /// Whether guides are planned with all patience: once there is no plan of those that were found in haste.
+    is_patient: bool,
     settings: SearchSettings,
     space: OptionSpace,
     query: Query,
@@ -144,6 +148,8 @@ impl<'a> Search<'a> {
         let mut this = Self {
             world,
             guides: &*method.guides,
+            hasty: method.guides.hasty(),
+            is_patient: false,
             settings: method.search,
             space: abstraction.space(method.search.allowed),
             query,
@@ -199,7 +205,10 @@ impl<'a> Search<'a> {
     ) -> Option<(f64, Vec<Arc<GuidedOption>>)> {
         loop {
             monitor.phase(Phase::Search);
-            let (cost_s, ids) = self.cheapest(measured)?;
+            let Some((cost_s, ids)) = self.cheapest(measured) else {
+                // Samples find few guides that a search does not, and take a hundred times as long.
+                if self.be_patient() { continue } else { return None }
+            };
             let missing: Vec<LegId> = ids.iter().copied().filter(|&id| self.found(id).is_none()).collect();
             if missing.is_empty() {
                 let options: Option<_> = ids.iter().map(|&id| self.found(id)?.ok().cloned()).collect();
@@ -212,8 +221,20 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Plans the guides of all of `ids`.
+    /// From now on guides are planned with all patience, those too that were not found in haste. Returns false if nothing
+    /// changes.
+    fn be_patient(&mut self) -> bool {
+        if std::mem::replace(&mut self.is_patient, true) || self.hasty.is_none() {
+            return false;
+        }
+        let before = self.guided.len();
+        self.guided.retain(|_, option| option.is_ok());
+        self.guided.len() < before
+    }
+
+    /// Plans the guides of all of `ids`, with all patience.
     pub(crate) fn guide_all(&mut self, ids: &[LegId]) {
+        self.be_patient();
         self.guide_while(ids, &|| true);
     }
 
@@ -361,11 +382,12 @@ impl<'a> Search<'a> {
     fn guide(&self, id: LegId) -> Result<Arc<GuidedOption>, NoGuide> {
         let candidate = self.graph.candidate(id).expect("the search returns its own options");
         if id == LegId::Direct && self.is_there() {
-            let guide = guide_of_nothing(self.query.start, self.settings.guide.spacing_m);
+            let is_free = |pose| self.world.geometry.is_free(pose);
+            let guide = guide_of_nothing(self.query.start, self.settings.guide.spacing_m, is_free);
             return guide.map(|guide| Arc::new(self.guided(candidate, guide)));
         }
         if !matches!(id, LegId::First(_) | LegId::Direct) {
-            return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option)?)));
+            return Ok(Arc::new(self.guided(candidate, self.plan_guide(&candidate.option, self.planner())?)));
         }
         // The guides of the direct way take longest: it does as the leg before it, however well that did.
         let least_bad = || self.least_bad.get().filter(|_| id == LegId::Direct).map(|way| way.number);
@@ -374,7 +396,8 @@ impl<'a> Search<'a> {
         if let Some(option) = again.and_then(|way| self.departing(candidate, way)) {
             return Ok(Arc::new(option));
         }
-        let at_once = self.plan_from(candidate, self.query.start).map(|guide| self.guided(candidate, guide));
+        let at_once = self.plan_from(candidate, self.query.start, self.planner());
+        let at_once = at_once.map(|guide| self.guided(candidate, guide));
         let is_tight = *self.is_tight.get_or_init(|| is_tight(&self.world.guide_robot(), self.query.start));
         let leaves_well = |option: &GuidedOption| self.pricer.price(option, None).parts().1 >= LEAVES_WELL;
         let start = self.query.start.position;
@@ -518,7 +541,8 @@ impl<'a> Search<'a> {
     /// The leg `candidate` with a guide that begins with `way`.
     fn departing(&self, candidate: &Candidate, way: &(Departure, Vec<Pose>)) -> Option<GuidedOption> {
         let (departure, lead) = way;
-        let rest = self.plan_from(candidate, *lead.last()?).ok()?;
+        // There are many ways out, and what needs samples beyond them needs them for driving at once too.
+        let rest = self.plan_from(candidate, *lead.last()?, self.hasty()).ok()?;
         let mut poses = lead.clone();
         poses.extend(&rest.poses()[1..]);
         let guide = GuidePath::new(poses, rest.spacing_m()).ok()?;
@@ -526,22 +550,35 @@ impl<'a> Search<'a> {
     }
 
     /// A guide for the leg `candidate` for a robot at `start`.
-    fn plan_from(&self, candidate: &Candidate, start: Pose) -> Result<GuidePath, NoGuide> {
+    fn plan_from(
+        &self,
+        candidate: &Candidate,
+        start: Pose,
+        planner: &dyn GuidePlanner,
+    ) -> Result<GuidePath, NoGuide> {
         if candidate.id() == LegId::Direct && self.settings.direct {
             let at_once = start == self.query.start;
             let expansions = if at_once { EXPANSIONS } else { EXPANSIONS_DEPARTING };
             return self.direct_route(start, candidate.option.end, expansions);
         }
         let (start, heading) = (start.position, Some(start.heading));
-        self.plan_guide(&UnguidedOption { start, heading, ..candidate.option })
+        self.plan_guide(&UnguidedOption { start, heading, ..candidate.option }, planner)
     }
 
-    fn plan_guide(&self, option: &UnguidedOption) -> Result<GuidePath, NoGuide> {
+    fn hasty(&self) -> &dyn GuidePlanner {
+        self.hasty.as_deref().unwrap_or(self.guides)
+    }
+
+    fn planner(&self) -> &dyn GuidePlanner {
+        if self.is_patient { self.guides } else { self.hasty() }
+    }
+
+    fn plan_guide(&self, option: &UnguidedOption, planner: &dyn GuidePlanner) -> Result<GuidePath, NoGuide> {
         let mut rng = self.seed.stream(&format!("guide {}", option.id), 0);
         let ends_there = matches!(option.id, LegId::Last(..) | LegId::Direct);
         let goal_heading = self.goal.heading.filter(|_| ends_there).map(|(heading, _)| heading);
         let option = UnguidedOption { goal_heading, ..*option };
-        option.plan_guide(&self.space, &self.world.guide_robot(), self.guides, &mut rng)
+        option.plan_guide(&self.space, &self.world.guide_robot(), planner, &mut rng)
     }
 
     /// The cheapest of the routes to `end` with different safety margins, by their prices.
@@ -587,9 +624,15 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The guide of a robot that has arrived before it begins.
-fn guide_of_nothing(start: Pose, spacing_m: f64) -> Result<GuidePath, NoGuide> {
-    let end = Pose::at(start.position + start.heading.unit() * (0.5 * spacing_m), start.heading);
+/// The guide of a robot that has arrived before it begins: half a spacing ahead, or a millimetre where that is not free.
+fn guide_of_nothing(
+    start: Pose,
+    spacing_m: f64,
+    is_free: impl Fn(Pose) -> bool,
+) -> Result<GuidePath, NoGuide> {
+    let ahead = |length_m| Pose::at(start.position + start.heading.unit() * length_m, start.heading);
+    let half = ahead(0.5 * spacing_m);
+    let end = if is_free(half) { half } else { ahead(0.001) };
     GuidePath::new(vec![start, end], spacing_m).map_err(|_| NoGuide::NoLength(start.position))
 }
 

@@ -193,6 +193,7 @@ mod tests {
         refused("cells:[(11,1)]", "cells:[]", "region 0");
         refused("cells:[(11,1)]", "cells:[(35,2)]", "region 0");
         refused("between:(0,1)", "between:(1,0)", "portal 0");
+        refused("between:(0,1)", "between:(1,1)", "portal 0");
         refused("between:(0,1)", "between:(0,5)", "names state 5");
     }
 }

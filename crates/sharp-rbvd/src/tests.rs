@@ -220,6 +220,41 @@ fn large_parts_without_a_region_get_one() {
         "#]],
     );
     assert!(rbvd.is_synthetic(StateId(1)), "the right part has a region of its own");
+    let share = rbvd.covered_share();
+    assert!((share - 40.0 / 42.0).abs() < 1e-12, "two of 42 cells have no state: {share}");
+}
+
+#[test]
+fn settings_for_a_robot_follow_from_its_width() {
+    let footprint = Footprint::rectangle(0.5, 0.3).unwrap();
+    let settings = RbvdSettings::for_footprint(&footprint, 0.02, 0.1);
+    let half_diagonal_m = 0.05 * std::f64::consts::SQRT_2;
+    for (found, expected) in [
+        (settings.min_clearance_m, 0.32),
+        (settings.fringe_clearance_m, 0.3 - half_diagonal_m),
+        (settings.portal_min_width_m, 0.64),
+    ] {
+        assert!((found - expected).abs() < 1e-12, "{found} m, expected {expected}: {settings:?}");
+    }
+    let coarse = RbvdSettings::for_footprint(&footprint, 0.02, 1.0);
+    assert_eq!(coarse.fringe_clearance_m, 0.0, "where cells are wider than the robot, all count");
+}
+
+#[test]
+fn a_portal_is_as_wide_as_its_door() {
+    for door in 1..=5 {
+        let row = |row: usize| match row {
+            0 => "A...........B\n",
+            row if row < door => ".............\n",
+            _ => ".....###.....\n",
+        };
+        let drawing: String = (0..7).map(row).collect();
+        let (rbvd, _) = build(&drawing, &RbvdSettings::default());
+        let width_m = rbvd.portals().iter().map(|portal| portal.width_m).fold(0.0, f64::max);
+        // The middle of an even number of cells lies between two of them.
+        let expected_m = if door % 2 == 1 { door as f64 } else { door as f64 - 1.0 };
+        assert_eq!(width_m, expected_m, "a door of {door} m");
+    }
 }
 
 #[test]
@@ -420,12 +455,22 @@ fn any_abstraction_can_be_stored_as_a_diagram() {
     let stored = Rbvd::from_abstraction(&tables);
     assert_eq!(check_abstraction(&stored), Ok(()));
     assert_eq!(stored.component_count(), 2, "the last room has no door");
+    assert_eq!(stored.settings().portal_min_width_m, rbvd.portals()[0].width_m, "there is one portal");
     for state in rbvd.states() {
         assert_eq!(StateAbstraction::neighbors(&tables, state), rbvd.neighbors(state), "{state:?}");
         assert_eq!(stored.neighbors(state), rbvd.neighbors(state), "{state:?}");
     }
     let text = ron::to_string(&stored).unwrap();
     assert_eq!(ron::from_str::<Rbvd>(&text), Ok(stored));
+}
+
+#[test]
+fn a_stored_abstraction_keeps_where_its_robot_may_stand() {
+    let settings = RbvdSettings { min_clearance_m: 2.0, fringe_clearance_m: 1.5, ..RbvdSettings::default() };
+    let (rbvd, _) = build(".......\n.......\n...A...\n.......\n.......", &settings);
+    let tables = Tables(rbvd.cells().clone(), rbvd.regions().to_vec(), rbvd.portals().to_vec());
+    let stored = Rbvd::from_abstraction(&tables).settings().clone();
+    assert_eq!((stored.min_clearance_m, stored.fringe_clearance_m), (1.5, 1.5), "{stored:?}");
 }
 
 #[test]

@@ -212,4 +212,27 @@ mod tests {
         assert_eq!(field.sample(Point::new(-0.1, 2.0)), 0.0, "left of the map");
         assert_eq!(field.at(Cell::new(2, 2)), 3.0, "the nearest blocked cell lies outside the border");
     }
+    #[test]
+    fn between_centres_the_clearance_is_that_of_four_cells() {
+        let (frame, mask) = (
+            GridFrame { origin: Pose::new(0.0, 0.0, 0.0), resolution_m: 0.5, width: 7, height: 6 },
+            [10, 11, 25, 38],
+        );
+        let field = DistanceField::from_mask(frame, |i| mask.contains(&i));
+        let at = |col, row| field.at(Cell::new(col, row));
+        for (col, row) in (0..6).flat_map(|col| (0..5).map(move |row| (col, row))) {
+            for (tx, ty) in [(0.0, 0.0), (0.25, 0.0), (0.0, 0.75), (0.5, 0.5), (0.875, 0.125)] {
+                let low = at(col, row) + tx * (at(col + 1, row) - at(col, row));
+                let high = at(col, row + 1) + tx * (at(col + 1, row + 1) - at(col, row + 1));
+                let point = Point::new((col as f64 + 0.5 + tx) * 0.5, (row as f64 + 0.5 + ty) * 0.5);
+                let (found, expected) = (field.sample(point), low + ty * (high - low));
+                assert!((found - expected).abs() < 1e-9, "{point:?}: {found}, expected {expected}");
+            }
+        }
+        // There is no cell beyond the outermost centres.
+        assert_eq!(field.sample(Point::new(0.01, 0.01)), at(0, 0), "lower left");
+        assert_eq!(field.sample(Point::new(3.49, 2.99)), at(6, 5), "upper right");
+        assert_eq!(field.sample(Point::new(3.5, 1.0)), 0.0, "on the border it is outside");
+        assert_eq!(field.sample(Point::new(1.0, 3.0)), 0.0, "on the border it is outside");
+    }
 }

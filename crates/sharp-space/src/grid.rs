@@ -310,6 +310,33 @@ mod tests {
     }
 
     #[test]
+    fn neighbors_are_the_cells_around_sides_first() {
+        let frame = frame(Pose::new(0.0, 0.0, 0.0));
+        for cell in (0..frame.len()).map(|index| frame.cell(index)) {
+            let off = |other: &Cell| (other.col.abs_diff(cell.col), other.row.abs_diff(cell.row));
+            let all: Vec<Cell> = (0..frame.len()).map(|index| frame.cell(index)).collect();
+            let count =
+                |reach: &[(usize, usize)]| all.iter().filter(|other| reach.contains(&off(other))).count();
+            let (sides, around): (Vec<Cell>, Vec<Cell>) =
+                (frame.neighbors4(cell).collect(), frame.neighbors8(cell).collect());
+            assert_eq!(sides.len(), count(&[(0, 1), (1, 0)]), "{cell:?}: {sides:?}");
+            assert_eq!(around.len(), count(&[(0, 1), (1, 0), (1, 1)]), "{cell:?}: {around:?}");
+            assert_eq!(around[..sides.len()], sides, "{cell:?}: sides come first");
+            let mut distinct = around.clone();
+            distinct.sort_unstable_by_key(|other| frame.index(*other));
+            distinct.dedup();
+            assert_eq!(distinct.len(), around.len(), "{cell:?}: each once: {around:?}");
+            assert!(around.iter().all(|other| off(other).0.max(off(other).1) == 1), "{cell:?}: {around:?}");
+        }
+    }
+
+    #[test]
+    fn free_cells_are_counted() {
+        let grid = OccupancyGrid::from_ascii(0.5, "#.?\n..#").expect("a sound drawing");
+        assert_eq!(grid.free_count(), 3);
+    }
+
+    #[test]
     fn broken_grids_are_refused() {
         let free = vec![Occupancy::Free; 12];
         let base = frame(Pose::new(0.0, 0.0, 0.0));

@@ -1,9 +1,12 @@
 //! What plans cost, how robots leave their start, and which plan is the cheapest.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use sharp_drive::SuccessCount;
+use sharp_guide::{ClearanceSearch, GuideRequest, GuideRobot};
 use sharp_rbvd::{Rbvd, RbvdSettings};
 use sharp_sim::RobotModel;
-use sharp_space::{DistanceField, GridFrame, Region, RegionId};
+use sharp_space::{DistanceField, GridFrame, Region, RegionId, Stream};
 
 use super::*;
 use crate::test_worlds::{HALL, RING, SEALED, along, straight, world};
@@ -488,4 +491,73 @@ fn an_option_without_a_guide_is_named_and_no_plan_uses_it() {
         let through = search.graph.candidate(leg("c:0-1")).expect("an option");
         assert_eq!(search.cost_s(through, None), f64::INFINITY, "it has lost its edge");
     });
+}
+
+/// A planner that counts how often it is asked, and what it does in haste.
+#[derive(Debug)]
+struct Thorough {
+    asked: Arc<AtomicUsize>,
+    finds_in_haste: bool,
+}
+
+impl GuidePlanner for Thorough {
+    fn plan(
+        &self,
+        request: &GuideRequest<'_>,
+        robot: &GuideRobot<'_>,
+        rng: &mut Stream,
+    ) -> Result<GuidePath, NoGuide> {
+        self.asked.fetch_add(1, Ordering::Relaxed);
+        ClearanceSearch::default().plan(request, robot, rng)
+    }
+
+    fn hasty(&self) -> Option<Box<dyn GuidePlanner>> {
+        Some(if self.finds_in_haste { Box::new(ClearanceSearch::default()) } else { Box::new(Never) })
+    }
+}
+
+#[derive(Debug)]
+struct Never;
+
+impl GuidePlanner for Never {
+    fn plan(&self, _: &GuideRequest<'_>, _: &GuideRobot<'_>, _: &mut Stream) -> Result<GuidePath, NoGuide> {
+        Err(NoGuide::Unreachable)
+    }
+}
+
+#[test]
+fn a_planner_that_takes_its_time_is_asked_only_where_there_is_no_plan_without_it() {
+    let (world, abstraction) = world(LINE, OptionKind::Centroid);
+    let query = Query { start: Pose::new(1.0, 1.0, 0.0), goal: Pose::new(11.4, 1.0, 0.0) };
+    let plan = |finds_in_haste| {
+        let asked = Arc::new(AtomicUsize::new(0));
+        let planner = Arc::new(Thorough { asked: Arc::clone(&asked), finds_in_haste });
+        let method = Method::fast().with_guide_planner(planner);
+        let search = Search::new(&world, &abstraction, &method, &NoiseModel::nominal(), query, [], Seed(1));
+        let plan = search.expect("both ends have a state").plan(&unmeasured, &());
+        (names(&plan.expect("there is a way").1), asked.load(Ordering::Relaxed))
+    };
+    let ((in_haste, never), (in_the_end, often)) = (plan(true), plan(false));
+    assert_eq!(in_haste, in_the_end, "the same plan");
+    assert_eq!(never, 0, "what was found in haste is good enough");
+    assert!(often > 0, "what was not found in haste is looked for again");
+}
+
+#[test]
+fn a_robot_that_has_arrived_before_it_begins_is_not_led_into_a_wall() {
+    let (world, abstraction) = world(HALL, OptionKind::Centroid);
+    // The nose of the Husky, half a metre ahead, touches the wall almost.
+    let start = Pose::new(9.05, 2.2, 0.0);
+    assert!(
+        world.geometry.is_free(start) && !world.geometry.is_free(Pose::new(9.175, 2.2, 0.0)),
+        "a tight place"
+    );
+    let query = Query { start, goal: Pose::new(9.0, 2.2, 0.0) };
+    let method = Method::fast();
+    let search = Search::new(&world, &abstraction, &method, &NoiseModel::nominal(), query, [], Seed(1));
+    let plan = search.expect("both ends have a state").plan(&unmeasured, &()).expect("nothing to do").1;
+    assert_eq!(names(&plan), "first:goal");
+    for pose in plan[0].guide.poses() {
+        assert!(world.geometry.is_free(*pose), "{pose:?} is not free");
+    }
 }

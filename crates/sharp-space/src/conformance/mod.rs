@@ -30,3 +30,23 @@ fn poses(bounds: Bounds) -> impl Iterator<Item = Pose> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose::Point;
+
+    #[test]
+    fn poses_are_spread_over_places_and_headings() {
+        let bounds = Bounds { min: Point::new(-1.0, 2.0), max: Point::new(3.0, 10.0) };
+        let mut counts = [0; 64];
+        for pose in poses(bounds) {
+            let turn = pose.heading.radians().rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU;
+            let shares = [(pose.position.x + 1.0) / 4.0, (pose.position.y - 2.0) / 8.0, turn];
+            let [x, y, turn] = shares.map(|share| (4.0 * share) as usize);
+            counts[16 * x + 4 * y + turn] += 1;
+        }
+        // 800 poses in 64 boxes: 12.5 in each.
+        assert!(counts.iter().all(|count| (6..=19).contains(count)), "{counts:?}");
+    }
+}
