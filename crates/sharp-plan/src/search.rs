@@ -26,6 +26,7 @@ use crate::method::{Method, PriceRule, SearchSettings};
 use crate::option_graph::{Candidate, OptionGraph};
 use crate::price::{Price, Pricer};
 use crate::query::{Monitor, Phase, Query};
+use crate::reason::{fits, narrowest_gap};
 
 /// What a hand-over costs that the robot should not be able to make, where no plan does without one, seconds.
 const HARD_HAND_OVER_S: f64 = 120.0;
@@ -73,7 +74,9 @@ pub struct Search<'a> {
     pricer: Pricer<'a>,
     /// What guided options cost before they are measured.
     prices: BTreeMap<LegId, Price>,
-    /// Whether the start is a tight place; found when it is first asked for, as is the next.
+    /// Whether the robot fits through the narrowest place on its way; found when it is first asked for, as are the next.
+    fits: OnceLock<bool>,
+    /// Whether the start is a tight place.
     is_tight: OnceLock<bool>,
     /// How the robot can leave its start.
     departures: OnceLock<Vec<(Departure, Vec<Pose>)>>,
@@ -158,6 +161,7 @@ impl<'a> Search<'a> {
             guided: BTreeMap::new(),
             pricer: Pricer::new(world, noise, method.search, method.failure_cost_s),
             prices: BTreeMap::new(),
+            fits: OnceLock::new(),
             is_tight: OnceLock::new(),
             departures: OnceLock::new(),
             trials: None,
@@ -222,14 +226,22 @@ impl<'a> Search<'a> {
     }
 
     /// From now on guides are planned with all patience, those too that were not found in haste. Returns false if nothing
-    /// changes.
+    /// changes, or no robot of this width gets from start to goal.
     fn be_patient(&mut self) -> bool {
         if std::mem::replace(&mut self.is_patient, true) || self.hasty.is_none() {
+            return false;
+        }
+        if !self.fits() {
             return false;
         }
         let before = self.guided.len();
         self.guided.retain(|_, option| option.is_ok());
         self.guided.len() < before
+    }
+
+    /// Whether the robot fits through the narrowest place between start and goal; where it does not, no patience helps.
+    fn fits(&self) -> bool {
+        *self.fits.get_or_init(|| fits(self.world, narrowest_gap(self.world, &self.query).as_ref()))
     }
 
     /// Plans the guides of all of `ids`, with all patience.
@@ -594,7 +606,8 @@ impl<'a> Search<'a> {
             found.take(self.settings.direct_routes).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
         let is_patient = self.settings.direct_routes > 1;
         let goal = (end, 0.5 * self.goal.radius_m);
-        let patient = || if is_patient { routes(&robot, start, goal, expansions).next() } else { None };
+        let patient =
+            || if is_patient && self.fits() { routes(&robot, start, goal, expansions).next() } else { None };
         cheapest.or_else(patient).ok_or(reason)
     }
 
