@@ -16,10 +16,13 @@ use crate::{cases, told};
 
 /// Distance between two looks, metres: a quarter of the planner's.
 const LOOK_M: f64 = 0.0125;
-/// Between two looks of the planner a corner may cut a corner by this much, metres.
-const ALLOWED_M: f64 = 0.002;
+/// Between two looks of the planner, in which a point of the outline moves 5 to 8 cm, it may overlap an obstacle by this much, metres.
+const ALLOWED_M: f64 = 0.005;
 /// Plans that are tried in each building.
 const QUERIES: u64 = 25;
+/// Buildings in which something was found once: a wall beside a goal that the robot stood in, a bend that became tighter when a
+/// joined guide was cut, a way of a minute to no plan, and a corner that was cut.
+const FOUND: [u64; 4] = [17, 60, 111, 260];
 
 /// What is wrong with the guides of a plan.
 pub(crate) fn fault(
@@ -65,9 +68,13 @@ pub(crate) fn fault(
 #[test]
 fn no_plan_leads_through_an_obstacle_or_round_a_bend_that_is_too_tight() {
     let since = Instant::now();
-    let wanted = cases(100, 1_000_000);
+    let buildings = cases(200, 1_000_000).div_ceil(QUERIES);
+    let others = (0..buildings).filter(|number| !FOUND.contains(number));
     let (tried, planned, slowest_ms) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
-    let faults: Vec<String> = (0..wanted.div_ceil(QUERIES))
+    let faults: Vec<String> = FOUND
+        .into_iter()
+        .chain(others)
+        .collect::<Vec<_>>()
         .into_par_iter()
         .flat_map_iter(|number| {
             let mut rng = Seed(18).stream("soak plans", number);

@@ -54,23 +54,19 @@ impl SuccessCount {
         wilson95(self.rate(), f64::from(self.episodes))
     }
 
-    /// Half the width of the 95 % Wilson score interval without the correction of [`wilson95`], in which it is easier to say how many
-    /// trials a width needs; one half before the first trial.
+    /// Half the width of the 95 % Wilson score interval without the correction of [`wilson95`]; one half before the first trial. It
+    /// decides how many trials are made.
     #[must_use]
     pub fn half_width95(&self) -> f64 {
-        if self.episodes == 0 {
-            return 0.5;
-        }
-        let (n, p, z2) = (f64::from(self.episodes), self.rate(), Z_95 * Z_95);
-        Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt() / (1.0 + z2 / n)
+        if self.episodes == 0 { 0.5 } else { half_width(self.rate(), f64::from(self.episodes)) }
     }
 }
 
 /// The 95 % Wilson score interval, with continuity correction, of a share `rate` that was counted on `episodes` trials, which need not
 /// be a whole number; from 0 to 1 without any.
 ///
-/// The correction makes it a promise: the interval holds the truth at least 95 times in 100 whatever the truth is, where the
-/// interval without it does so on average over all truths (between 92 and 97 times for 200 trials).
+/// With the correction the interval holds the truth at least 94.8 times in 100 whatever the truth is, and 95 times or more where
+/// it lies between 0.02 and 0.98; without it, 84 to 98 times.
 ///
 /// E. B. Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", 1927; R. G. Newcombe, "Two-sided confidence
 /// intervals for the single proportion: comparison of seven methods", 1998, method 4.
@@ -90,7 +86,16 @@ fn lower_end(rate: f64, episodes: f64) -> f64 {
     }
     let (n, p, z2) = (episodes, rate, Z_95 * Z_95);
     let square = z2 - 2.0 - 1.0 / n + 4.0 * p * (n * (1.0 - p) + 1.0);
-    ((2.0 * n * p + z2 - 1.0 - Z_95 * square.max(0.0).sqrt()) / (2.0 * (n + z2))).max(0.0)
+    let corrected = (2.0 * n * p + z2 - 1.0 - Z_95 * square.max(0.0).sqrt()) / (2.0 * (n + z2));
+    // With less than one success, which a share of trials can be, the correction goes the wrong way.
+    let plain = (p + z2 / (2.0 * n)) / (1.0 + z2 / n) - half_width(p, n);
+    corrected.min(plain).max(0.0)
+}
+
+/// Half the width of the interval without correction.
+fn half_width(rate: f64, episodes: f64) -> f64 {
+    let (n, p, z2) = (episodes, rate, Z_95 * Z_95);
+    Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt() / (1.0 + z2 / n)
 }
 
 #[cfg(test)]
@@ -127,9 +132,9 @@ mod tests {
     }
 
     #[test]
-    fn intervals_hold_the_truth_at_least_95_times_in_100() {
+    fn intervals_hold_the_truth_95_times_in_100() {
         for episodes in [24, 48, 200, 500] {
-            for permille in (300..1000).step_by(7).chain([995, 998, 999]) {
+            for permille in (1..1000).step_by(7) {
                 let truth = f64::from(permille) / 1000.0;
                 let chances = binomial(episodes, truth);
                 let holds = |successes: u32| {
@@ -137,7 +142,8 @@ mod tests {
                     (count.lower95()..=count.upper95()).contains(&truth)
                 };
                 let held: f64 = (0..=episodes).filter(|&k| holds(k)).map(|k| chances[k as usize]).sum();
-                assert!(held >= 0.95, "a rate of {truth} on {episodes} trials is held {held} of the time");
+                let least = if (0.02..=0.98).contains(&truth) { 0.95 } else { 0.948 };
+                assert!(held >= least, "a rate of {truth} on {episodes} trials is held {held} of the time");
             }
         }
     }
@@ -150,6 +156,19 @@ mod tests {
             assert!((width - half).abs() < 1e-4, "{successes}/{episodes}: {width}");
         }
         assert_eq!(SuccessCount::default().half_width95(), 0.5, "nothing is known");
+    }
+
+    #[test]
+    fn intervals_hold_what_was_counted() {
+        for episodes in [0.05, 0.3, 1.0, 10.0, 100.0] {
+            for rate in [0.0, 1e-4, 0.001, 0.4, 0.999, 1.0] {
+                let (lower, upper) = wilson95(rate, episodes);
+                assert!((0.0..=rate).contains(&lower), "{rate} of {episodes}: from {lower}");
+                assert!((rate..=1.0).contains(&upper), "{rate} of {episodes}: to {upper}");
+            }
+        }
+        let (lower, upper) = wilson95(0.5, 0.05);
+        assert!(upper - lower > 0.9, "hardly anything is known: {lower} to {upper}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The planning context of one guide: request, robot, settings, and the steps of its planning.
 
 use sharp_motion::{Maneuver, Steering};
-use sharp_space::{CollisionChecker, Heading, Point, Pose, Vector, WidestPaths};
+use sharp_space::{CollisionChecker, Heading, Point, Pose, RobotGeometry, Vector, WidestPaths};
 
 use crate::band::{self, BandSettings, COARSE_M};
 use crate::inflate::GuideRobot;
@@ -238,17 +238,13 @@ impl<'a> GuideContext<'a> {
 
     /// Checks outline, bends and cells along `guide`.
     pub(crate) fn check(&self, guide: &GuidePath) -> Result<(), NoGuide> {
-        let steps = (guide.length_m() / CHECK_STEP_M).ceil();
-        for i in 0..=steps as usize {
-            let pose = guide.pose_at(guide.length_m() * i as f64 / steps);
-            if !self.robot.geometry.is_free(pose) {
-                return Err(NoGuide::Footprint(pose.position));
-            }
+        if let Some(place) = first_touch(guide, self.robot.geometry) {
+            return Err(NoGuide::Footprint(place));
         }
-        let poses = guide.poses();
         if let Some(place) = tight_bend(guide, self.robot.steering.radius_m()) {
             return Err(NoGuide::Bend(place));
         }
+        let poses = guide.poses();
         // The ends are given, not chosen.
         match poses[1..poses.len() - 1].iter().find(|pose| !self.is_allowed(pose.position)) {
             Some(pose) => Err(NoGuide::Astray(pose.position)),
@@ -264,6 +260,12 @@ impl<'a> GuideContext<'a> {
             .cell_at(point)
             .is_some_and(|cell| (self.request.allowed)(cell))
     }
+}
+
+/// The last pose of `guide` before its outline first touches an obstacle, in a turn as well as on the way.
+pub(crate) fn first_touch(guide: &GuidePath, geometry: &dyn RobotGeometry) -> Option<Point> {
+    let touches = |pair: &&[Pose]| !geometry.is_segment_free(pair[0], pair[1], CHECK_STEP_M);
+    guide.poses().windows(2).find(touches).map(|pair| pair[0].position)
 }
 
 /// The first place where `guide` is too tight a bend for a robot that turns on `radius_m`.

@@ -12,7 +12,7 @@ use sharp_options::Endpoint;
 use sharp_rbvd::StateId;
 use sharp_space::{Cell, Heading, Point, Pose};
 
-use crate::context::tight_bend;
+use crate::context::{first_touch, tight_bend};
 use crate::gap::narrowest_gap_m;
 use crate::guided_option::GuidedOption;
 use crate::inflate::GuideRobot;
@@ -101,9 +101,12 @@ fn joined(
         let cuts = cuts(options, &path)?;
         let pieces = cuts.windows(2).map(|ends| piece(&path, ends[0], ends[1], settings.spacing_m));
         let pieces: Vec<GuidePath> = pieces.collect::<Option<_>>()?;
-        // The chords of a piece lie between those of the whole path and can be shorter in a bend.
-        let is_tight = |piece: &GuidePath| tight_bend(piece, robot.steering.radius_m()).is_some();
-        (!pieces.iter().any(is_tight)).then_some(pieces)
+        // The chords of a piece lie between those of the whole path: they cut its corners.
+        let is_sound = |piece: &GuidePath| {
+            tight_bend(piece, robot.steering.radius_m()).is_none()
+                && first_touch(piece, robot.geometry).is_none()
+        };
+        pieces.iter().all(is_sound).then_some(pieces)
     })
 }
 

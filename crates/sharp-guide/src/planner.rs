@@ -27,8 +27,8 @@ pub trait GuidePlanner: Debug + Send + Sync {
         rng: &mut Stream,
     ) -> Result<GuidePath, NoGuide>;
 
-    /// A planner that gives up sooner, for a first look at many options: what it finds this one finds too. `None`, the
-    /// default, if there is none.
+    /// A planner that gives up sooner, for a first look at many options; `None`, the default, if there is none. Whatever it
+    /// finds, `self` must find as well.
     fn hasty(&self) -> Option<Box<dyn GuidePlanner>> {
         None
     }

@@ -22,7 +22,8 @@ use crate::tree::{Direction, Extender, Extension, poses_along};
 
 /// Grows a tree from the start, the goal and each free seed and links them; seeds in collision are skipped.
 ///
-/// Returns the cheapest path in the roadmap that was grown.
+/// Returns the cheapest path in the roadmap that was grown. It gives up after the budget's samples, or when the roadmap has
+/// grown three times as many poses as the budget has samples.
 pub fn learn_and_link(
     query: &MotionQuery,
     seeds: &[Pose],
@@ -38,6 +39,7 @@ pub fn learn_and_link(
     let extender = Extender { checker, steering, settings };
     let free_seeds = seeds.iter().copied().filter(|&seed| checker.is_free(seed));
     let mut roadmap = Roadmap::new(query, free_seeds);
+    let seeded = roadmap.poses.len();
     let mut turn = START;
     for iteration in 0..settings.budget.iterations {
         let direction = roadmap.growth(turn, iteration);
@@ -51,10 +53,16 @@ pub fn learn_and_link(
             return PathOutcome::Solved(Path::new(poses).expect("it holds the start"));
         }
         turn = roadmap.next_group(turn);
+        // Every pose is compared with all others.
+        if roadmap.poses.len() - seeded > POSES_A_SAMPLE.saturating_mul(settings.budget.iterations) {
+            return PathOutcome::Exhausted { iterations: iteration + 1 };
+        }
     }
     PathOutcome::Exhausted { iterations: settings.budget.iterations }
 }
 
+/// Poses that a roadmap may grow for each sample of the budget.
+const POSES_A_SAMPLE: usize = 3;
 /// The group of poses that the start leads to.
 const START: usize = 0;
 /// The group of poses that lead to the goal.

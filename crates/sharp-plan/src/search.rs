@@ -3,7 +3,8 @@
 //! Costs begin as lower bounds. Whenever A* returns a plan, its options without a guide are guided and their costs
 //! become exact, or infinite where no guide exists. Then A* runs again, until a plan consists of guided options
 //! only. That plan is as cheap as if every option had been guided beforehand (lazy shortest-path search), and an
-//! option that cannot be guided has lost its edge: the repair that downward refinability needs.
+//! option that cannot be guided has lost its edge: the repair that downward refinability needs. Guides that only samples
+//! find are looked for where there is no plan without them.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -209,10 +210,13 @@ impl<'a> Search<'a> {
     ) -> Option<(f64, Vec<Arc<GuidedOption>>)> {
         loop {
             monitor.phase(Phase::Search);
-            let Some((cost_s, ids)) = self.cheapest(measured) else {
-                // Samples find few guides that a search does not, and take a hundred times as long.
-                if self.be_patient() { continue } else { return None }
-            };
+            let strict = self.cheapest(measured, f64::INFINITY);
+            // Where a search finds no guide, samples seldom find one either, and take a hundred times as long.
+            if strict.is_none() && self.be_patient() {
+                continue;
+            }
+            // A hand-over that may fail is better than no plan: what it is worth will be measured.
+            let (cost_s, ids) = strict.or_else(|| self.cheapest(measured, HARD_HAND_OVER_S))?;
             let missing: Vec<LegId> = ids.iter().copied().filter(|&id| self.found(id).is_none()).collect();
             if missing.is_empty() {
                 let options: Option<_> = ids.iter().map(|&id| self.found(id)?.ok().cloned()).collect();
@@ -225,15 +229,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// From now on guides are planned with all patience, those too that were not found in haste. Returns false if nothing
-    /// changes, or no robot of this width gets from start to goal.
+    /// From now on guides are planned with all patience, those too that were not found in haste. Returns false if that changes
+    /// nothing: there is no hasty planner, or no robot of this width gets from start to goal.
     fn be_patient(&mut self) -> bool {
-        if std::mem::replace(&mut self.is_patient, true) || self.hasty.is_none() {
+        if self.is_patient || self.hasty.is_none() || !self.fits() {
             return false;
         }
-        if !self.fits() {
-            return false;
-        }
+        self.is_patient = true;
         let before = self.guided.len();
         self.guided.retain(|_, option| option.is_ok());
         self.guided.len() < before
@@ -246,7 +248,7 @@ impl<'a> Search<'a> {
 
     /// Plans the guides of all of `ids`, with all patience.
     pub(crate) fn guide_all(&mut self, ids: &[LegId]) {
-        self.be_patient();
+        self.is_patient = true;
         self.guide_while(ids, &|| true);
     }
 
@@ -278,8 +280,12 @@ impl<'a> Search<'a> {
         self.guided.insert(id, option);
     }
 
-    /// The cost and the names of the cheapest plan by what is known now.
-    fn cheapest(&self, measured: &dyn Fn(LegId) -> Option<SuccessEstimate>) -> Option<(f64, Vec<LegId>)> {
+    /// The cost and the names of the cheapest plan by what is known now, in which no hand-over counts for more than `most_s`.
+    fn cheapest(
+        &self,
+        measured: &dyn Fn(LegId) -> Option<SuccessEstimate>,
+        most_s: f64,
+    ) -> Option<(f64, Vec<LegId>)> {
         let top_speed = self.world.robot.max_speed_mps;
         let cost = |option: &Candidate| self.cost_s(option, measured(option.id()));
         let charge = |before: &Candidate, after: &Candidate| {
@@ -287,14 +293,10 @@ impl<'a> Search<'a> {
             let known = || self.known.as_ref()?.charge(pair);
             self.charges.get(&pair).copied().or_else(known).unwrap_or(0.0)
         };
-        let strict =
-            |before: &Candidate, after: &Candidate| self.hand_over_s(before, after) + charge(before, after);
-        // A hand-over that may fail is better than no plan: what it is worth will be measured.
-        let lenient = |before: &Candidate, after: &Candidate| {
-            self.hand_over_s(before, after).min(HARD_HAND_OVER_S) + charge(before, after)
+        let hand_over = |before: &Candidate, after: &Candidate| {
+            self.hand_over_s(before, after).min(most_s) + charge(before, after)
         };
-        let found = self.graph.search(top_speed, cost, strict);
-        found.or_else(|| self.graph.search(top_speed, cost, lenient))
+        self.graph.search(top_speed, cost, hand_over)
     }
 
     /// The option called `id` with a guide of its own, if it was guided.
@@ -553,7 +555,7 @@ impl<'a> Search<'a> {
     /// The leg `candidate` with a guide that begins with `way`.
     fn departing(&self, candidate: &Candidate, way: &(Departure, Vec<Pose>)) -> Option<GuidedOption> {
         let (departure, lead) = way;
-        // There are many ways out, and what needs samples beyond them needs them for driving at once too.
+        // There are many ways out. With samples beyond each of them a start that is tight took minutes.
         let rest = self.plan_from(candidate, *lead.last()?, self.hasty()).ok()?;
         let mut poses = lead.clone();
         poses.extend(&rest.poses()[1..]);
@@ -604,10 +606,15 @@ impl<'a> Search<'a> {
         let found = found.filter_map(|route| route.map_err(|why| reason = why).ok());
         let cheapest =
             found.take(self.settings.direct_routes).min_by(|a, b| price_s(a).total_cmp(&price_s(b)));
-        let is_patient = self.settings.direct_routes > 1;
+        let may_search_lattice = self.settings.direct_routes > 1;
         let goal = (end, 0.5 * self.goal.radius_m);
-        let patient =
-            || if is_patient && self.fits() { routes(&robot, start, goal, expansions).next() } else { None };
+        let patient = || {
+            if may_search_lattice && self.fits() {
+                routes(&robot, start, goal, expansions).next()
+            } else {
+                None
+            }
+        };
         cheapest.or_else(patient).ok_or(reason)
     }
 
@@ -637,7 +644,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The guide of a robot that has arrived before it begins: half a spacing ahead, or a millimetre where that is not free.
+/// The guide of a robot that has arrived before it begins: half a spacing ahead, or where that is not free a millimetre, which is
+/// as free as the start.
 fn guide_of_nothing(
     start: Pose,
     spacing_m: f64,

@@ -235,8 +235,8 @@ mod tests {
         assert_eq!(
             rows,
             [
-                "regions on a grid limo centroid 1 1/1 12/20 0.387-0.781 20/20",
-                "the paper's learning limo centroid 1 0/1 0/20 0.000-0.161 20/20"
+                "regions on a grid limo centroid 1 1/1 12/20 0.364-0.800 20/20",
+                "the paper's learning limo centroid 1 0/1 0/20 0.000-0.200 20/20"
             ]
         );
         assert_eq!(figure.panels.len(), 2, "success and time of one robot");

@@ -153,7 +153,7 @@ mod tests {
         for needle in [
             "1 of 2 predictions (50 %) are within 3 points",
             "1 of 2 lie in the interval measured",
-            "98.0 % predicted, 75.0 % measured (59.8 to 85.8 %)",
+            "98.0 % predicted, 75.0 % measured (58.5 to 86.8 %)",
         ] {
             assert!(figure.caption.contains(needle), "no {needle:?} in {}", figure.caption);
         }

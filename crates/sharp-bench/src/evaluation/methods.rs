@@ -164,10 +164,10 @@ mod tests {
         let lines = [track(1, 20), track(2, 18), sharp];
         let text = tables(&lines.iter().collect::<Vec<_>>());
         for expected in [
-            "| track | harsh | limo | 38/40 | 0.835-0.986 | 2 | 0 | 30.0 | 3.00 | 0.0 |",
-            "| sharp interface grid | nominal | limo | 20/20 | 0.839-1.000 | 0 | 0 | 25.0 | 5.00 | 0.0 |",
+            "| track | harsh | limo | 38/40 | 0.818-0.991 | 2 | 0 | 30.0 | 3.00 | 0.0 |",
+            "| sharp interface grid | nominal | limo | 20/20 | 0.800-1.000 | 0 | 0 | 25.0 | 5.00 | 0.0 |",
             "`track`:\n\n| env | robot | harsh | nominal |\n|---|---|---|---|\n\
-             | b | limo | 38/40 (0.83-0.99) 2c 30 s |  |",
+             | b | limo | 38/40 (0.82-0.99) 2c 30 s |  |",
         ] {
             assert!(text.contains(expected), "no {expected:?} in\n{text}");
         }

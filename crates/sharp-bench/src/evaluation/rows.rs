@@ -185,7 +185,7 @@ mod tests {
         let rows: Vec<String> = figure.table.rows.iter().map(|row| row.join(" ")).collect();
         assert_eq!(
             rows,
-            ["a limo P1 SHARP interface 1 20/20 0.839-1.000", "a limo P1 RRT 1 5/20 0.112-0.469"]
+            ["a limo P1 SHARP interface 1 20/20 0.800-1.000", "a limo P1 RRT 1 5/20 0.096-0.494"]
         );
         assert_eq!(figure.panels.len(), 1, "one environment, one robot");
     }

@@ -90,7 +90,7 @@ mod tests {
         let one = rows(&[&line]);
         assert!(one[0].starts_with("| env | problem | robot | options | success |"), "{one:?}");
         assert!(
-            one[2].starts_with("| a | P1 | limo | centroid | 20/20 | 0.84-1.00 | 0.980 | 1/4 |"),
+            one[2].starts_with("| a | P1 | limo | centroid | 20/20 | 0.80-1.00 | 0.980 | 1/4 |"),
             "{one:?}"
         );
         let two = rows(&[&line, &louder]);

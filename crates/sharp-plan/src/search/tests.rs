@@ -293,7 +293,7 @@ fn plans_cost_their_legs_and_their_hand_overs() {
         let second = turned((6.2, 1.0), (8.6, 1.0), turn_rad);
         let known = vec![(before, straight((3.8, 1.0), (6.2, 1.0))), (after, second)];
         look(&world, (query, settings), known, |search| {
-            let (cost_s, ids) = search.cheapest(&unmeasured).expect("the only way");
+            let (cost_s, ids) = search.cheapest(&unmeasured, HARD_HAND_OVER_S).expect("the only way");
             assert!((cost_s - wanted_s).abs() < 1e-3, "a turn of {turn_rad} rad: {cost_s} s, {ids:?}");
             assert_eq!(search.can_follow(before, after), turn_rad < 1.0, "after {turn_rad} rad");
             assert!(search.can_follow(leg("c:0-1"), before), "one of them has no guide yet");
@@ -302,7 +302,7 @@ fn plans_cost_their_legs_and_their_hand_overs() {
             assert!((priced_s - 4.8).abs() < 1e-6, "2.4 m at 0.5 m/s, and nothing else: {priced_s} s");
             assert_eq!(search.priced_s(leg("c:0-1")), None, "no guide, no price");
             search.charge(before, after, 7.0);
-            let (charged_s, _) = search.cheapest(&unmeasured).expect("the only way");
+            let (charged_s, _) = search.cheapest(&unmeasured, HARD_HAND_OVER_S).expect("the only way");
             assert!((charged_s - cost_s - 7.0).abs() < 1e-6, "{cost_s} s became {charged_s} s");
         });
     }
