@@ -21,8 +21,8 @@ const ALLOWED_M: f64 = 0.005;
 /// Plans that are tried in each building.
 const QUERIES: u64 = 25;
 /// Buildings in which something was found once: a wall beside a goal that the robot stood in, a bend that became tighter when a
-/// joined guide was cut, a way of a minute to no plan, and a corner that was cut.
-const FOUND: [u64; 4] = [17, 60, 111, 260];
+/// joined guide was cut, a way of a minute to no plan, and corners that were cut.
+const FOUND: [u64; 6] = [17, 60, 111, 260, 281, 411];
 
 /// What is wrong with the guides of a plan.
 pub(crate) fn fault(
@@ -68,7 +68,7 @@ pub(crate) fn fault(
 #[test]
 fn no_plan_leads_through_an_obstacle_or_round_a_bend_that_is_too_tight() {
     let since = Instant::now();
-    let buildings = cases(200, 1_000_000).div_ceil(QUERIES);
+    let buildings = cases(100, 1_000_000).div_ceil(QUERIES);
     let others = (0..buildings).filter(|number| !FOUND.contains(number));
     let (tried, planned, slowest_ms) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
     let faults: Vec<String> = FOUND

@@ -8,11 +8,15 @@ use std::cell::OnceCell;
 use sharp_motion::{Budget, HybridSettings, MotionQuery, Path, Steering, hybrid_astar};
 use sharp_space::{Heading, Point, Pose};
 
+use crate::context::first_touch;
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
 use crate::plan::{Drafts, searched_guide};
 use crate::request::{GuideEnd, GuideRequest, NoGuide};
 use crate::settings::GuideSettings;
+
+/// Shares of the usual spacing at which the path of a car is tried as a guide.
+const SPACING_SHARES: [f64; 3] = [0.99, 0.5, 0.2];
 
 /// A route from `start` to within `goal_radius_m` of `goal` for each safety margin for which there is one, the largest
 /// margin first. Each is planned when it is asked for; a search gives up after so many `expansions`.
@@ -84,15 +88,17 @@ fn searched(
 ) -> Option<GuidePath> {
     let query = MotionQuery { start, goal: Pose::at(goal, start.heading) };
     let path = hybrid_astar(&query, robot.geometry, &robot.steering, settings).path()?;
-    as_guide(&path, &robot.steering)
+    // A path by way of few poses cuts its corners.
+    let mut guides = SPACING_SHARES.into_iter().filter_map(|share| as_guide(&path, &robot.steering, share));
+    guides.find(|guide| first_touch(guide, robot.geometry).is_none())
 }
 
-/// The path as a guide: a car's with its headings; otherwise the corners at which the robot turns in
-/// place stay sharp, and headings follow the direction of travel.
-fn as_guide(path: &Path, steering: &Steering) -> Option<GuidePath> {
+/// The path as a guide: a car's with its headings, a pose each `share` of the usual spacing; otherwise the corners at which the
+/// robot turns in place stay sharp, and headings follow the direction of travel.
+fn as_guide(path: &Path, steering: &Steering, share: f64) -> Option<GuidePath> {
     let spacing_m = GuideSettings::default().spacing_m;
     if matches!(steering, Steering::Dubins { .. }) {
-        return GuidePath::new(path.resample(0.99 * spacing_m).poses().to_vec(), spacing_m).ok();
+        return GuidePath::new(path.resample(share * spacing_m).poses().to_vec(), spacing_m).ok();
     }
     let mut positions: Vec<Point> = path.poses().iter().map(|pose| pose.position).collect();
     positions.dedup_by(|a, b| (*a - *b).norm() < 1e-9);

@@ -84,7 +84,7 @@ const fn is_none(runs: &u32) -> bool {
 impl ComposedOdds {
     /// The odds of `pieces` that follow one another.
     ///
-    /// The interval is Wilson's for as many runs as would leave the same uncertainty: to first order the variance of the logarithm of
+    /// The interval is Wilson's with continuity correction for as many runs as would leave the same uncertainty: to first order the variance of the logarithm of
     /// a product is the sum of the factors' (1 - p) / (p n).
     #[must_use]
     pub fn of(pieces: Vec<PlanPiece>) -> Self {
