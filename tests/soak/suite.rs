@@ -40,7 +40,7 @@ struct Seen {
 
 /// A simulator whose every step is looked at.
 #[derive(Clone, Debug)]
-struct Watched {
+struct WatchedSimulator {
     simulator: Box<dyn Simulator>,
     robot: Arc<RobotModel>,
     outline: Outline,
@@ -50,7 +50,7 @@ struct Watched {
     seen: Arc<Mutex<Seen>>,
 }
 
-impl Simulator for Watched {
+impl Simulator for WatchedSimulator {
     fn reset(&mut self, state: RobotState) {
         self.simulator.reset(state);
     }
@@ -67,7 +67,7 @@ impl Simulator for Watched {
     }
 }
 
-impl Watched {
+impl WatchedSimulator {
     fn look(&self, before: Pose, command: WheelCommand, info: StepInfo) {
         let state = *self.simulator.state();
         let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
@@ -136,7 +136,7 @@ fn drive(
     (kind, noise, runs): (SimulatorKind, NoiseModel, u32),
 ) -> (Seen, u32) {
     let seen = Arc::new(Mutex::new(Seen::default()));
-    let watched = Watched {
+    let watched = WatchedSimulator {
         simulator: plan.world.simulator(kind),
         robot: Arc::clone(&plan.world.robot),
         outline: outline.clone(),
