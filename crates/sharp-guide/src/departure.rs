@@ -107,7 +107,10 @@ fn curve(
             Primitive { travel_m: CHECK_STEP_M, turn_rad: side * CHECK_STEP_M / radius_m }.advance(here, 1.0)
         };
         let mut bends = RADII_M.into_iter().filter(|&radius_m| radius_m >= least_m).map(bend);
-        let pose = bends.find(|&pose| noisy.is_free(pose))?;
+        // Half-way a corner of the outline may cut one of an obstacle.
+        let is_clear =
+            |pose: Pose| noisy.is_free(pose) && robot.geometry.is_free(here.interpolate(&pose, 0.5));
+        let pose = bends.find(|&pose| is_clear(pose))?;
         lead.push(pose);
         if wide.is_free(pose) {
             return Some((Departure { careful_m: i as f64 * CHECK_STEP_M, ..after }, lead));
