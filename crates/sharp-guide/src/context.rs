@@ -199,7 +199,7 @@ impl<'a> GuideContext<'a> {
 
     /// Puts a curve before `guide` that leads the robot from its heading at the start onto the path,
     /// unless it looks along the path already or can turn there.
-    fn lead_in(&self, guide: GuidePath) -> Result<GuidePath, NoGuide> {
+    pub(crate) fn lead_in(&self, guide: GuidePath) -> Result<GuidePath, NoGuide> {
         let Some(heading) = self.request.start.heading else { return Ok(guide) };
         let start = Pose::at(guide.start().position, heading);
         let off = heading.turn_to(guide.start().heading).abs();
@@ -252,6 +252,18 @@ impl<'a> GuideContext<'a> {
         }
     }
 
+    /// Where [`check`](Self::check) finds something wrong with `guide`, metres along it.
+    pub(crate) fn faults_m(&self, guide: &GuidePath) -> Vec<f64> {
+        let poses = guide.poses();
+        let astray = (1..poses.len() - 1).filter(|&index| !self.is_allowed(poses[index].position));
+        let bends = tight_bends(guide, self.robot.steering.radius_m());
+        touches(guide, self.robot.geometry)
+            .chain(bends)
+            .chain(astray)
+            .map(|index| guide.arc_m(index))
+            .collect()
+    }
+
     fn is_allowed(&self, point: Point) -> bool {
         self.robot
             .geometry
@@ -264,15 +276,27 @@ impl<'a> GuideContext<'a> {
 
 /// The last pose of `guide` before its outline first touches an obstacle, in a turn as well as on the way.
 pub(crate) fn first_touch(guide: &GuidePath, geometry: &dyn RobotGeometry) -> Option<Point> {
-    let touches = |pair: &&[Pose]| !geometry.is_segment_free(pair[0], pair[1], CHECK_STEP_M);
-    guide.poses().windows(2).find(touches).map(|pair| pair[0].position)
+    touches(guide, geometry).next().map(|index| guide.poses()[index].position)
+}
+
+/// The poses of `guide` between which and the next one its outline touches an obstacle.
+pub(crate) fn touches(guide: &GuidePath, geometry: &dyn RobotGeometry) -> impl Iterator<Item = usize> {
+    let poses = guide.poses();
+    let is_free = |index: usize| geometry.is_segment_free(poses[index], poses[index + 1], CHECK_STEP_M);
+    (0..poses.len() - 1).filter(move |&index| !is_free(index))
 }
 
 /// The first place where `guide` is too tight a bend for a robot that turns on `radius_m`.
 pub(crate) fn tight_bend(guide: &GuidePath, radius_m: f64) -> Option<Point> {
-    let is_tight = |pair: &&[Pose]| {
-        let turn = pair[0].heading.turn_to(pair[1].heading).abs();
-        turn * radius_m > CURVATURE_SLACK * pair[0].distance_m(&pair[1])
+    tight_bends(guide, radius_m).next().map(|index| guide.poses()[index].position)
+}
+
+/// The poses of `guide` from which to the next one it is too tight a bend for a robot that turns on `radius_m`.
+pub(crate) fn tight_bends(guide: &GuidePath, radius_m: f64) -> impl Iterator<Item = usize> {
+    let poses = guide.poses();
+    let is_tight = move |index: usize| {
+        let (from, to) = (poses[index], poses[index + 1]);
+        from.heading.turn_to(to.heading).abs() * radius_m > CURVATURE_SLACK * from.distance_m(&to)
     };
-    guide.poses().windows(2).find(is_tight).map(|pair| pair[0].position)
+    (0..poses.len() - 1).filter(move |&index| is_tight(index))
 }

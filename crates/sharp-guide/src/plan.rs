@@ -130,34 +130,9 @@ fn sample_guide(
     sampled_guide(&context, &way, rng)
 }
 
-/// Smooths `way`, a polyline from the request's start to its goal, into a guide path and checks it, as
-/// [`plan_guide`] does with a way of its own. It passes through all `discs` (centre and radius, metres).
-///
-/// # Errors
-/// Says what the last attempt failed of.
-pub(crate) fn smooth_guide(
-    (way, discs): (&[Point], &[(Point, f64)]),
-    request: &GuideRequest<'_>,
-    robot: &GuideRobot<'_>,
-    settings: &GuideSettings,
-) -> Result<GuidePath, NoGuide> {
-    let context = GuideContext::new(request, robot, settings);
-    context.has_length()?;
-    let frame = robot.geometry.clearance().frame();
-    let points: Vec<Vector> = way.iter().map(|&point| frame.to_grid(point)).collect();
-    let mut last = Err(NoGuide::NoLength(request.start.position));
-    for attempt in attempts(settings, frame.resolution_m) {
-        last = context.finish(&context.draft((&points, discs), &attempt));
-        if last.is_ok() {
-            break;
-        }
-    }
-    last
-}
-
 /// What is tried in turn: as set; more respect for walls; less, for a rounder path;
 /// every cell. The last two let the goal's heading go.
-fn attempts(settings: &GuideSettings, resolution_m: f64) -> [Attempt; 4] {
+pub(crate) fn attempts(settings: &GuideSettings, resolution_m: f64) -> [Attempt; 4] {
     let (weight, pull_per_m2, margin_m) =
         (settings.clearance_weight, settings.pull_per_m2, settings.margin_m);
     let base = Attempt { weight, pull_per_m2, margin_m, aim_goal: true };
@@ -202,7 +177,11 @@ mod tests {
         let end = |position| GuideEnd { position, heading: None };
         let request = GuideRequest { start: end(way[0]), goal: end(way[way.len() - 1]), allowed: &|_| true };
         let robot = GuideRobot::new(checker, Steering::RotateTranslate);
-        smooth_guide((way, discs), &request, &robot, &GuideSettings::default())
+        let settings = GuideSettings::default();
+        let context = GuideContext::new(&request, &robot, &settings);
+        let frame = checker.clearance().frame();
+        let points: Vec<Vector> = way.iter().map(|&point| frame.to_grid(point)).collect();
+        context.finish(&context.draft((&points, discs), &attempts(&settings, frame.resolution_m)[0]))
     }
 
     #[test]

@@ -66,7 +66,7 @@ impl GuidePlanner for ClearanceSearch {
 }
 
 /// The guide of the `widest` robot, or else of the first of `others`, whose margins shrink to none, for which there is one.
-fn largest_margin<'a>(
+pub(crate) fn largest_margin<'a>(
     request: &GuideRequest<'_>,
     widest: GuideRobot<'a>,
     others: &[GuideRobot<'a>],

@@ -8,15 +8,21 @@ use std::cell::OnceCell;
 use sharp_motion::{Budget, HybridSettings, MotionQuery, Path, Steering, hybrid_astar};
 use sharp_space::{Heading, Point, Pose};
 
-use crate::context::first_touch;
+use crate::context::{GuideContext, first_touch, tight_bend};
 use crate::inflate::GuideRobot;
+use crate::join::JOINT_TURN_MAX_RAD;
 use crate::path::GuidePath;
 use crate::plan::{Drafts, searched_guide};
+use crate::planner::largest_margin;
 use crate::request::{GuideEnd, GuideRequest, NoGuide};
 use crate::settings::GuideSettings;
 
 /// Shares of the usual spacing at which the path of a car is tried as a guide.
 const SPACING_SHARES: [f64; 3] = [0.99, 0.5, 0.2];
+/// How far from its start a route begins that robots join which leave the start in different ways, metres.
+const BEYOND_M: f64 = 3.0;
+/// So far along it they have joined it, metres.
+const JOINT_M: f64 = 2.0;
 
 /// A route from `start` to within `goal_radius_m` of `goal` for each safety margin for which there is one, the largest
 /// margin first. Each is planned when it is asked for; a search gives up after so many `expansions`.
@@ -60,6 +66,48 @@ pub fn ridge_routes<'a>(
             });
         }
         Some(found)
+    })
+}
+
+/// The rest of a route from `start`, without its first metres, for the largest safety margin for which there is one: robots
+/// that leave `start` in different ways can join it ([`joining`]).
+///
+/// # Errors
+/// Says why there is none.
+pub fn route_beyond(
+    robot: &GuideRobot<'_>,
+    start: Point,
+    (goal, heading): (Point, Option<Heading>),
+) -> Result<GuidePath, NoGuide> {
+    let without_margin = GuideRobot::new(robot.geometry, robot.steering);
+    let end = |position, heading| GuideEnd { position, heading };
+    let request = GuideRequest { start: end(start, None), goal: end(goal, heading), allowed: &|_| true };
+    let settings = GuideSettings::default();
+    let way = GuideContext::new(&request, &without_margin, &settings).least_way()?;
+    let frame = robot.geometry.clearance().frame();
+    let mut way = way.into_iter().map(|point| frame.from_grid(point));
+    let begin = way.find(|point| (point - start).norm() >= BEYOND_M).unwrap_or(goal);
+    let request = GuideRequest { start: end(begin, None), ..request };
+    let mut robots = robot.inflated_at(None);
+    let widest = robots.next().unwrap_or(without_margin);
+    largest_margin(&request, widest, &robots.collect::<Vec<_>>(), &settings)
+}
+
+/// A route that begins at `start` and goes on along `route`, which begins nearby; for the largest safety margin for which there
+/// is one.
+#[must_use]
+pub fn joining(robot: &GuideRobot<'_>, start: Pose, route: &GuidePath) -> Option<GuidePath> {
+    let joint = route.pose_at(JOINT_M);
+    let rest = route.from_arc(JOINT_M)?;
+    let mut drafts = Drafts::default();
+    robot.inflated_at(Some(start)).find_map(|robot| {
+        let first = ridge(&robot, start, (joint.position, Some(joint.heading)), &mut drafts).ok()?;
+        let poses = [first.poses(), &rest.poses()[1..]].concat();
+        let joined = GuidePath::new(poses, route.spacing_m()).ok()?;
+        let is_sound = tight_bend(&joined, robot.steering.radius_m()).is_none()
+            && first.end().heading.turn_to(joint.heading).abs() <= JOINT_TURN_MAX_RAD
+            && first_touch(&joined, robot.geometry).is_none();
+        is_sound.then_some(joined)
     })
 }
 

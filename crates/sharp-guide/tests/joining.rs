@@ -4,10 +4,23 @@ mod worlds;
 
 use std::sync::Arc;
 
-use sharp_guide::{GuideSettings, GuidedOption, join_guides};
+use sharp_guide::{Departure, GuideSettings, GuidedOption, join_guides};
 use sharp_options::OptionKind;
-use sharp_space::{Point, Pose};
+use sharp_space::{CollisionChecker, Point, Pose};
 use worlds::{Drawn, HALL, Problem, RING, along};
+
+/// Two halls with a door of two cells between them, and four regions in a row.
+const TWO_HALLS: &str = "
+    #################################################
+    #.......................#.......................#
+    #.......................#.......................#
+    #.......................#.......................#
+    #....0......1...................2.......3.......#
+    #...............................................#
+    #.......................#.......................#
+    #.......................#.......................#
+    #.......................#.......................#
+    #################################################";
 
 /// Half way round the block of the [`RING`].
 fn around() -> Problem {
@@ -56,12 +69,53 @@ fn joined_guides_meet_in_the_sets_and_bend_less() {
 }
 
 #[test]
-fn a_path_that_cannot_meet_a_set_leaves_the_guides_alone() {
+fn where_a_path_cannot_meet_a_set_the_guides_are_left_alone() {
     let drawn = Drawn::new(HALL, OptionKind::Centroid);
     let alone = drawn.plan(&["first:0", "c:0-1", "c:1-2", "last:2"], along());
-    // Backwards, the sets come in the wrong order.
-    let backwards: Vec<Arc<GuidedOption>> = alone.iter().rev().cloned().collect();
-    assert!(guides_are_equal(&joined(&drawn, &backwards, along().start), &backwards), "backwards");
+    // There and back again: no path along the hall meets the same sets in the wrong order.
+    let back = [0, 2, 1, 3].map(|index| Arc::clone(&alone[index])).to_vec();
+    let joined_back = joined(&drawn, &back, along().start);
+    let kept = back.iter().zip(&joined_back).filter(|(before, after)| Arc::ptr_eq(before, after)).count();
+    assert!(kept > 0, "all of it was joined");
+    for (before, after) in back.iter().zip(&joined_back) {
+        let ends = [(before.guide.end(), after.guide.end()), (before.guide.start(), after.guide.start())];
+        let off_m = ends.map(|(before, after)| before.distance_m(&after));
+        assert!(off_m.iter().all(|&off_m| off_m < 0.5), "{}: moved by {off_m:?} m", after.id);
+    }
     let single = joined(&drawn, &alone[..1], along().start);
     assert!(guides_are_equal(&single, &alone[..1]), "one option has nothing to join");
+}
+
+#[test]
+fn a_narrow_door_takes_the_margin_from_the_options_beside_it_alone() {
+    // The door in the middle is 0.8 m wide, the robot 0.67 m.
+    let drawn = Drawn::new(TWO_HALLS, OptionKind::Centroid);
+    let plan = ["first:0", "c:0-1", "c:1-2", "c:2-3", "last:3"];
+    let problem = Problem { start: Pose::new(1.0, 2.2, 0.0), goal: Point::new(18.6, 2.2) };
+    let alone = drawn.plan(&plan, problem);
+    let joined = joined(&drawn, &alone, problem.start);
+    let widest = &*drawn.robot().inflated[0].geometry;
+    let has_margin: Vec<bool> = joined
+        .iter()
+        .map(|option| option.guide.poses().windows(2).all(|pair| widest.is_segment_free(pair[0], pair[1], 0.05)))
+        .collect();
+    assert_eq!(has_margin, [true, true, false, true, true], "{plan:?}");
+    for pair in joined.windows(2) {
+        let (end, start) = (pair[0].guide.end(), pair[1].guide.start());
+        assert!(end.distance_m(&start) < 1e-9, "{} to {}: a gap", pair[0].id, pair[1].id);
+        assert!(end.heading.turn_to(start.heading).abs() < 0.16, "{} to {}: a kink", pair[0].id, pair[1].id);
+        assert!(pair[0].is_done(&end), "{}: the path misses the set", pair[0].id);
+    }
+}
+
+#[test]
+fn behind_a_beginning_that_is_driven_with_care_all_others_are_joined() {
+    let drawn = Drawn::new(HALL, OptionKind::Centroid);
+    let mut alone = drawn.plan(&["first:0", "c:0-1", "c:1-2", "last:2"], along());
+    let careful = Departure { careful_m: 0.5, ..Departure::default() };
+    alone[0] = Arc::new(GuidedOption::clone(&alone[0]).with_departure(careful));
+    let joined = joined(&drawn, &alone, along().start);
+    assert!(Arc::ptr_eq(&joined[0], &alone[0]), "it stays as it was");
+    assert!(joined[1..].iter().zip(&alone[1..]).all(|(after, before)| after.guide != before.guide));
+    assert!(joined[0].guide.end().distance_m(&joined[1].guide.start()) < 1e-9, "a gap");
 }

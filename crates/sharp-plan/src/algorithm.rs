@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use sharp_drive::SuccessEstimate;
-use sharp_guide::{GuideRobot, GuidedOption, LegId, Role, join_guides};
+use sharp_guide::{GuidedOption, LegId, join_guides};
 
 use crate::abstraction::Abstraction;
 use crate::files::FileError;
@@ -19,7 +19,7 @@ use crate::odds::{ComposedOdds, refine};
 use crate::policies::Policies;
 use crate::problem::PlanningProblem;
 use crate::query::Phase;
-use crate::reason::{Gap, fits, is_joined, narrowest_gap, obstruction, unturned};
+use crate::reason::{Gap, fits, narrowest_gap, obstruction, unturned};
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
 use crate::verify::{PlannedOption, Solution, composed, predict, verify};
@@ -119,8 +119,8 @@ fn algorithm_1(
             if monitor.should_stop() && best.is_none() {
                 return Ok(Outcome::Stopped);
             }
-            // Where the map joins start and goal, a motion planner may know a way that no options know.
-            if is_joined(world, &query) && search.offer_direct() {
+            // Where the robot fits through, a motion planner may know a way that no options know.
+            if search.fits() && search.offer_direct() {
                 continue;
             }
             break;
@@ -205,31 +205,11 @@ fn cheapest(
 }
 
 fn join(problem: &PlanningProblem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOption>> {
-    if !problem.method.join_guides {
+    let PlanningProblem { world, method, query, .. } = *problem;
+    if !method.join_guides {
         return plan;
     }
-    let robot = problem.world.guide_robot();
-    let (start, settings) = (problem.query.start, &problem.method.search.guide);
-    if problem.method.verify_episodes > 0 {
-        return join_guides(plan, start, &robot, settings);
-    }
-    // What is composed must drive as it was measured: a start or goal with little room must not take the safety margin from
-    // the options between. So either the whole plan is joined with the full margin, or its options alone.
-    let widest = GuideRobot { inflated: &robot.inflated[..robot.inflated.len().min(1)], ..robot };
-    let is_option = |leg: &Arc<GuidedOption>| leg.id.role() == Role::Option;
-    let whole = || join_guides(plan.clone(), start, &widest, settings);
-    let options = || {
-        let options: Vec<_> = plan.iter().filter(|leg| is_option(leg)).cloned().collect();
-        let start = options.first()?.guide.start();
-        Some(join_guides(options, start, &robot, settings))
-    };
-    let (joined, options) = rayon::join(whole, options);
-    if joined.iter().zip(&plan).any(|(joined, alone)| !Arc::ptr_eq(joined, alone)) {
-        return joined;
-    }
-    let Some(options) = options else { return plan };
-    let mut options = options.into_iter();
-    plan.into_iter().map(|leg| if is_option(&leg) { options.next().unwrap_or(leg) } else { leg }).collect()
+    join_guides(plan, query.start, &world.guide_robot(), &method.search.guide)
 }
 
 fn has_weak_option(

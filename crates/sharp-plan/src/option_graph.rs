@@ -127,12 +127,20 @@ impl OptionGraph {
         join: impl Fn(&Candidate, &Candidate) -> f64,
     ) -> Option<(f64, Vec<LegId>)> {
         let is_goal = |node: NodeIndex| self.graph[node].as_ref().is_some_and(|leg| leg.endpoint.is_none());
-        let edge_cost = |before: NodeIndex, after: NodeIndex| {
-            let after = self.graph[after].as_ref().map_or(0.0, |leg| {
-                cost(leg) + self.graph[before].as_ref().map_or(0.0, |before| join(before, leg))
-            });
-            debug_assert!(after >= 0.0, "costs are not negative");
-            after
+        // An option is asked for from every option before it.
+        let mut costs_s = vec![f64::NAN; self.graph.node_count()];
+        let mut edge_cost = |before: NodeIndex, after: NodeIndex| {
+            let Some(leg) = &self.graph[after] else { return 0.0 };
+            let cost_s = &mut costs_s[after.index()];
+            if cost_s.is_nan() {
+                *cost_s = cost(leg);
+            }
+            debug_assert!(*cost_s >= 0.0, "costs are not negative");
+            match &self.graph[before] {
+                // Where no way leads on it does not matter how the robot would turn onto it.
+                Some(before) if cost_s.is_finite() => *cost_s + join(before, leg),
+                _ => *cost_s,
+            }
         };
         let heuristic = |node: NodeIndex| {
             self.graph[node].as_ref().map_or(0.0, |leg| (leg.option.end - self.goal).norm() / speed_max_mps)

@@ -1,15 +1,14 @@
 //! Why there is no plan, in words that lead to a remedy.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 use sharp_drive::World;
-use sharp_guide::{NoGuide, gap_m, ridge_routes};
+use sharp_guide::{gap_m, joining, ridge_routes, route_beyond};
 use sharp_space::{Cell, GridFrame, Heading, Occupancy, Point, Pose};
 
 use crate::query::Query;
-use crate::search::{DEPARTURE_REACH_M, goal_of};
+use crate::search::{JOINED_FROM_M, goal_of};
 
 /// Room beside the outline below which a way counts as narrow for a robot under noise, metres.
 const NARROW_M: f64 = 0.1;
@@ -55,7 +54,7 @@ pub(crate) struct Gap {
 
 /// The narrowest place of the widest way from start to goal; `None` if no free way joins them.
 pub(crate) fn narrowest_gap(world: &World, query: &Query) -> Option<Gap> {
-    let place = is_joined(world, query).then(|| narrowest_place(world, query)).flatten()?;
+    let place = narrowest_place(world, query)?;
     Some(Gap { place, width_m: width_at(world, place) })
 }
 
@@ -71,19 +70,19 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
     let goal = goal_of(query.goal, world, None);
     let end = goal.easiest_end(world.geometry.clearance(), world.robot.footprint.inscribed_radius_m());
     let model = &world.robot;
-    let leads_on = |start: Pose| {
-        let mut found = Err(NoGuide::Unreachable);
-        ridge_routes(&robot, start, (end, None)).any(|route| {
-            found = route.map(|_| ());
-            found.is_ok()
-        });
-        found
-    };
-    let as_it_looks = leads_on(query.start);
-    if as_it_looks.as_ref().is_err_and(|why| why.is_beyond(query.start.position, DEPARTURE_REACH_M)) {
+    // Headings matter near the start alone: all of them join one way.
+    let is_far = query.start.distance_m(&query.goal) >= JOINED_FROM_M;
+    let beyond = is_far.then(|| route_beyond(&robot, query.start.position, (end, None)));
+    if let Some(Err(_)) = beyond {
         return None;
     }
-    if goal.contains(query.start.position) || as_it_looks.is_ok() {
+    let beyond = beyond.and_then(Result::ok);
+    let leads_on = |start: Pose| match &beyond {
+        Some(beyond) => joining(&robot, start, beyond).is_some(),
+        None => ridge_routes(&robot, start, (end, None)).any(|route| route.is_ok()),
+    };
+    let leads_on_as_it_looks = leads_on(query.start);
+    if goal.contains(query.start.position) || leads_on_as_it_looks {
         return asks_heading.then(|| {
             "the goal can be reached, but no way was found that arrives in the heading that is asked for"
                 .to_owned()
@@ -96,7 +95,7 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
     if !(1..HEADINGS)
         .into_par_iter()
         .map(turned)
-        .any(|start| world.geometry.is_free(start) && leads_on(start).is_ok())
+        .any(|start| world.geometry.is_free(start) && leads_on(start))
     {
         return None;
     }
@@ -115,13 +114,6 @@ pub(crate) fn unturned(world: &World, query: &Query, asks_heading: bool) -> Opti
         "the way to the goal is wide enough, but the {} cannot turn onto it from its heading at the start: {needs}, and {back}",
         model.name
     ))
-}
-
-/// Returns true if some free way joins start and goal, however narrow.
-pub(crate) fn is_joined(world: &World, query: &Query) -> bool {
-    let (frame, field) = (world.grid.frame(), world.geometry.clearance());
-    let ends = (frame.cell_at(query.start.position), frame.cell_at(query.goal.position));
-    matches!(ends, (Some(start), Some(goal)) if field.widest_paths().narrowest(start, goal).is_some())
 }
 
 /// Returns true if start and goal are joined where unknown space counts as free.
@@ -154,64 +146,33 @@ fn beside(frame: &GridFrame, Cell { row, col }: Cell) -> impl Iterator<Item = Ce
         .map(|(row, col)| Cell::new(col, row))
 }
 
-/// A cell with the least clearance on the way to it; the one with the most comes first.
-#[derive(PartialEq)]
-struct Reached {
-    least_m: f64,
-    narrowest: Cell,
-    cell: Cell,
-}
-
-impl Eq for Reached {}
-
-impl PartialOrd for Reached {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Reached {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.least_m.total_cmp(&other.least_m).then_with(|| other.cell.cmp(&self.cell))
-    }
-}
-
 /// The place with the least clearance on the way from start to goal whose least clearance is largest; `None` if no
 /// free way joins them. Ways begin and end with the clearance that start and goal have.
 fn narrowest_place(world: &World, query: &Query) -> Option<Point> {
+    let frame = world.grid.frame();
+    let ends = (around(world, query.start.position)?, around(world, query.goal.position)?);
+    let place = world.geometry.clearance().widest_paths().narrowest_between(&ends.0, &ends.1)?;
+    Some(frame.center(place))
+}
+
+/// The free cells near `end` that a way from it leads to, and those where it leaves them: near its ends a way may be as narrow
+/// as they are, for that the robot fits there is checked elsewhere. `None` outside the map.
+fn around(world: &World, end: Point) -> Option<Vec<Cell>> {
     let (frame, field) = (world.grid.frame(), world.geometry.clearance());
-    let start = frame.cell_at(query.start.position)?;
-    let goal = frame.cell_at(query.goal.position)?;
-    // Near its ends a way may be as narrow as they are: that the robot fits there is checked elsewhere.
-    let near_end = 2.0 * world.robot.footprint.circumscribed_radius_m();
-    let clearance_m = |cell: Cell| {
-        let at = frame.center(cell);
-        let is_near = |end: Point| (at - end).norm() < near_end;
-        if is_near(query.start.position) || is_near(query.goal.position) {
-            f64::INFINITY
-        } else {
-            field.at(cell)
-        }
-    };
-    let mut seen = vec![false; frame.len()];
-    let mut open = BinaryHeap::from([Reached { least_m: f64::INFINITY, narrowest: start, cell: start }]);
-    while let Some(Reached { least_m, narrowest, cell }) = open.pop() {
-        if std::mem::replace(&mut seen[frame.index(cell)], true) {
+    let near_m = 2.0 * world.robot.footprint.circumscribed_radius_m();
+    let middle = frame.cell_at(end)?;
+    let (mut seen, mut open) = (BTreeSet::from([middle]), vec![middle]);
+    while let Some(cell) = open.pop() {
+        if cell != middle && (frame.center(cell) - end).norm() >= near_m {
             continue;
         }
-        if cell == goal {
-            return Some(frame.center(narrowest));
-        }
-        for next in beside(frame, cell) {
-            if !seen[frame.index(next)] && field.at(next) > 0.0 {
-                let here_m = clearance_m(next);
-                let (least_m, narrowest) =
-                    if here_m < least_m { (here_m, next) } else { (least_m, narrowest) };
-                open.push(Reached { least_m, narrowest, cell: next });
+        for next in beside(frame, cell).filter(|&next| field.at(next) > 0.0) {
+            if seen.insert(next) {
+                open.push(next);
             }
         }
     }
-    None
+    Some(seen.into_iter().collect())
 }
 
 /// The free length of the shortest straight line through `place`, metres.

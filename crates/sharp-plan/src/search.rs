@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use sharp_drive::{Driver, InitialStates, SuccessEstimate, World};
 use sharp_guide::{
     Departure, Goal, GuidePath, GuidePlanner, GuidedOption, LegId, NoGuide, OptionSpace, UnguidedOption,
-    arriving, departures, is_tight, ridge_routes, routes,
+    arriving, departures, is_tight, joining, ridge_routes, route_beyond, routes,
 };
 use sharp_options::OptionId;
 use sharp_rbvd::{StateAbstraction, StateId};
@@ -50,7 +50,9 @@ const TRIAL_M: f64 = 2.5;
 /// Ways out of a tight start that are tried side by side where an answer is wanted at once.
 const WAYS_AT_ONCE: usize = 2;
 /// What is in the way further from the start than this cannot be helped by leaving it otherwise, metres.
-pub(crate) const DEPARTURE_REACH_M: f64 = 4.0;
+const DEPARTURE_REACH_M: f64 = 4.0;
+/// Ways out of a tight start join one direct way where the goal is at least so far, metres.
+pub(crate) const JOINED_FROM_M: f64 = 8.0;
 /// The best way out for an earlier leg is enough for the next one if it succeeds at most so much less often.
 const LESS: f64 = 0.1;
 /// A leg from the start that succeeds less often than this, by its price and then when tried, looks for a better way to
@@ -90,6 +92,8 @@ pub struct Search<'a> {
     chosen: OnceLock<Option<usize>>,
     /// If no way did well for a leg: the best of the first such leg.
     least_bad: OnceLock<LeastBad>,
+    /// The direct way without its first metres, which all ways out of the start join.
+    beyond: OnceLock<Option<GuidePath>>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Options that are at hand from the beginning, the same for every search of a building.
@@ -169,6 +173,7 @@ impl<'a> Search<'a> {
             is_hurried: false,
             chosen: OnceLock::new(),
             least_bad: OnceLock::new(),
+            beyond: OnceLock::new(),
             offers_direct: false,
             known: None,
             charges: BTreeMap::new(),
@@ -242,7 +247,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether the robot fits through the narrowest place between start and goal; where it does not, no patience helps.
-    fn fits(&self) -> bool {
+    pub(crate) fn fits(&self) -> bool {
         *self.fits.get_or_init(|| fits(self.world, narrowest_gap(self.world, &self.query).as_ref()))
     }
 
@@ -556,11 +561,25 @@ impl<'a> Search<'a> {
     fn departing(&self, candidate: &Candidate, way: &(Departure, Vec<Pose>)) -> Option<GuidedOption> {
         let (departure, lead) = way;
         // There are many ways out. With samples beyond each of them a start that is tight took minutes.
-        let rest = self.plan_from(candidate, *lead.last()?, self.hasty()).ok()?;
+        let start = *lead.last()?;
+        let is_far = start.distance_m(&self.query.goal) >= JOINED_FROM_M;
+        let rest = if candidate.id() == LegId::Direct && self.settings.direct && is_far {
+            joining(&self.world.guide_robot(), start, self.beyond()?)?
+        } else {
+            self.plan_from(candidate, start, self.hasty()).ok()?
+        };
         let mut poses = lead.clone();
         poses.extend(&rest.poses()[1..]);
         let guide = GuidePath::new(poses, rest.spacing_m()).ok()?;
         Some(self.guided(candidate, guide).with_departure(*departure))
+    }
+
+    /// The direct way without its first metres.
+    fn beyond(&self) -> Option<&GuidePath> {
+        let heading = self.goal.heading.map(|(heading, _)| heading);
+        let goal = (self.graph.candidate(LegId::Direct)?.option.end, heading);
+        let plan = || route_beyond(&self.world.guide_robot(), self.query.start.position, goal).ok();
+        self.beyond.get_or_init(plan).as_ref()
     }
 
     /// A guide for the leg `candidate` for a robot at `start`.
@@ -572,6 +591,12 @@ impl<'a> Search<'a> {
     ) -> Result<GuidePath, NoGuide> {
         if candidate.id() == LegId::Direct && self.settings.direct {
             let at_once = start == self.query.start;
+            // What fails near the start need not be searched to a far goal with every margin.
+            let is_far = start.distance_m(&self.query.goal) >= JOINED_FROM_M;
+            if self.is_hurried && is_far {
+                let begins = |beyond| joining(&self.world.guide_robot(), start, beyond);
+                self.beyond().and_then(begins).ok_or(NoGuide::Unreachable)?;
+            }
             let expansions = if at_once { EXPANSIONS } else { EXPANSIONS_DEPARTING };
             return self.direct_route(start, candidate.option.end, expansions);
         }

@@ -6,6 +6,7 @@
 //! climbs at most the logarithm of the number of cells.
 
 use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use crate::distance_field::DistanceField;
 use crate::grid::{Cell, GridFrame};
@@ -103,6 +104,40 @@ impl WidestPaths {
         }
         Some(self.frame.cell(narrowest))
     }
+
+    /// The same between two places of several cells: a cell with the least distance on the way from any of `from` to any of
+    /// `to` whose least distance is largest; `None` if no way joins them. A cell of both is its own way.
+    ///
+    /// # Panics
+    /// If a cell lies outside the field.
+    #[must_use]
+    pub fn narrowest_between(&self, from: &[Cell], to: &[Cell]) -> Option<Cell> {
+        // All cells climb at once, always along the earliest link, until a cell of each side meets one of the other.
+        let mut sides: BTreeMap<u32, usize> = BTreeMap::new();
+        let mut open = BinaryHeap::new();
+        for (side, cells) in [from, to].into_iter().enumerate() {
+            for &cell in cells {
+                let node = self.frame.index(cell) as u32;
+                match sides.insert(node, side) {
+                    Some(before) if before != side => return Some(cell),
+                    Some(_) => {}
+                    None => open.push(Reverse((self.links[node as usize], node))),
+                }
+            }
+        }
+        while let Some(Reverse((TreeLink { order, cell }, node))) = open.pop() {
+            if order == u32::MAX {
+                break;
+            }
+            let (side, parent) = (sides[&node], self.parents[node as usize]);
+            match sides.insert(parent, side) {
+                Some(before) if before != side => return Some(self.frame.cell(cell as usize)),
+                Some(_) => {}
+                None => open.push(Reverse((self.links[parent as usize], parent))),
+            }
+        }
+        None
+    }
 }
 
 #[cfg(test)]
@@ -146,7 +181,19 @@ mod tests {
                 let (a, b) = (cell(), cell());
                 let found = paths.narrowest(a, b).map_or(0.0, |cell| field.at(cell));
                 assert_eq!(found, by_floods(&field, a, b), "{a:?} to {b:?} in\n{}", drawing.join("\n"));
-                if found > 0.0 { joined += 1 } else { apart += 1 }
+                if found > 0.0 {
+                    joined += 1
+                } else {
+                    apart += 1
+                }
+                assert_eq!(paths.narrowest_between(&[a], &[b]), paths.narrowest(a, b));
+                let (c, d) = (cell(), cell());
+                if a != b && a != d && c != b && c != d {
+                    let found = paths.narrowest_between(&[a, c], &[b, d]).map_or(0.0, |cell| field.at(cell));
+                    let pairs = [(a, b), (a, d), (c, b), (c, d)];
+                    let widest = pairs.map(|(one, other)| by_floods(&field, one, other));
+                    assert_eq!(found, widest.into_iter().fold(0.0, f64::max), "{pairs:?}");
+                }
             }
         }
         assert!(joined > 100 && apart > 100, "{joined} pairs joined, {apart} apart");
