@@ -3,7 +3,7 @@
 //! The guide of an option is planned for the option alone, through the centres of its sets. In a plan the robot
 //! comes from somewhere and goes on to somewhere. So the guides of the plan are smoothed together and cut where
 //! they come nearest to those centres. Where the joined path fails at a place, the options around it alone are smoothed
-//! again, with smaller margins. Where that fails too, the options there keep their own guides, and those before and
+//! again in the other ways, with the same margin and then with smaller ones. Where that fails too, the options there keep their own guides, and those before and
 //! behind are joined. The library keeps the guides as they were planned.
 
 use std::cell::Cell as Memory;
@@ -37,7 +37,7 @@ const AROUND_M: f64 = 2.0;
 /// There the path may turn by so much where it joins the rest, radians.
 pub(crate) const JOINT_TURN_MAX_RAD: f64 = 0.15;
 
-/// `options`, which follow one another from `start`, with guides that join smoothly wherever that is possible.
+/// `options`, which follow one another from `start`, with guides that join smoothly where that is possible.
 #[must_use]
 pub fn join_guides(
     options: Vec<Arc<GuidedOption>>,
@@ -82,7 +82,7 @@ struct Chain<'a> {
 }
 
 /// A joined path, and what is wrong with it.
-struct Draft {
+struct JoinedPath {
     path: GuidePath,
     /// Where it passes from one option to the next, metres, with both of its ends.
     cuts_m: Vec<f64>,
@@ -121,7 +121,8 @@ impl<'a> Chain<'a> {
             return;
         }
         let attempts = self.attempts();
-        let mut robots = self.robot.inflated_at(Some(ends.start));
+        // A cramped end takes the margin from the options around it alone.
+        let mut robots = self.robot.inflated_at(None);
         let Some(draft) = robots.next().and_then(|widest| self.draft(&run, ends, &widest, &attempts[0]))
         else {
             return;
@@ -173,17 +174,14 @@ impl<'a> Chain<'a> {
         let robots: Vec<GuideRobot<'_>> = self.robot.inflated_at(Some(ends.start)).collect();
         let widest_m = robots.first()?.geometry.footprint().inscribed_radius_m();
         let gap_m = narrowest_gap_m(self.robot.geometry.clearance(), &self.way(part, ends), widest_m);
-        let joins = |path: &GuidePath| {
-            let (start, end) = (path.start().heading, path.end().heading);
-            let is_straight = |a: Heading, b: Heading| a.turn_to(b).abs() <= JOINT_TURN_MAX_RAD;
-            let goal = ends.goal.heading.filter(|_| part.end < run.end);
-            (part.start == run.start || is_straight(ends.start.heading, start))
-                && goal.is_none_or(|heading| is_straight(end, heading))
+        let is_straight = |path: &GuidePath| {
+            let turn_rad = ends.start.heading.turn_to(path.start().heading).abs();
+            part.start == run.start || turn_rad <= JOINT_TURN_MAX_RAD
         };
+        let attempts = self.attempts();
         let sound = |robot: &GuideRobot<'_>| {
-            let drafts = self.attempts();
-            let mut drafts = drafts.iter().filter_map(|attempt| self.draft(part, ends, robot, attempt));
-            drafts.find(|draft| draft.faults_m.is_empty() && joins(&draft.path))
+            let mut drafts = attempts.iter().filter_map(|attempt| self.draft(part, ends, robot, attempt));
+            drafts.find(|draft| draft.faults_m.is_empty() && is_straight(&draft.path))
         };
         robots.iter().filter(|robot| fits(robot, gap_m)).find_map(sound).map(|draft| draft.pieces)
     }
@@ -208,7 +206,7 @@ impl<'a> Chain<'a> {
         ends: RunEnds,
         robot: &GuideRobot<'_>,
         attempt: &Attempt,
-    ) -> Option<Draft> {
+    ) -> Option<JoinedPath> {
         let options = &self.options[run.clone()];
         let RunEnds { start, goal } = ends;
         let start = GuideEnd { position: start.position, heading: Some(start.heading) };
@@ -229,6 +227,13 @@ impl<'a> Chain<'a> {
         };
         let mut faults_m = context.faults_m(&path);
         faults_m.extend(cannot_begin);
+        if self.turns_too_far_before(run.start, start.heading, &path) {
+            faults_m.push(0.0);
+        }
+        let wanted = goal.heading.filter(|_| run.end < self.options.len());
+        if wanted.is_some_and(|wanted| path.end().heading.turn_to(wanted).abs() > JOINT_TURN_MAX_RAD) {
+            faults_m.push(path.length_m());
+        }
         let cuts_m = cuts_m(options, &path)?;
         let between = options.iter().zip(&cuts_m[1..]).take(options.len() - 1);
         let missed = between.filter(|&(option, &cut_m)| !option.is_done(&path.pose_at(cut_m)));
@@ -241,7 +246,14 @@ impl<'a> Chain<'a> {
             faults_m.extend(faults.into_iter().map(|arc_m| begin_m + arc_m));
         }
         faults_m.sort_by(f64::total_cmp);
-        Some(Draft { path, cuts_m, pieces, faults_m })
+        Some(JoinedPath { path, cuts_m, pieces, faults_m })
+    }
+
+    /// Whether `path` begins further off `heading`, in which the option before number `first` ends, than their own guides do.
+    fn turns_too_far_before(&self, first: usize, heading: Option<Heading>, path: &GuidePath) -> bool {
+        let (Some(before), Some(heading)) = (first.checked_sub(1), heading) else { return false };
+        let own = self.options[before].guide.end().heading.turn_to(self.options[first].guide.start().heading);
+        heading.turn_to(path.start().heading).abs() > own.abs().max(JOINT_TURN_MAX_RAD)
     }
 
     /// Where the robot itself cannot drive `piece`, metres along it.
@@ -251,7 +263,7 @@ impl<'a> Chain<'a> {
     }
 }
 
-impl Draft {
+impl JoinedPath {
     /// The leg in which the place `arc_m` along the path lies.
     fn leg_at(&self, arc_m: f64) -> usize {
         let behind = self.cuts_m[1..self.cuts_m.len() - 1].iter();

@@ -57,6 +57,6 @@ pub use path::{GuidePath, GuidePathError, Projection};
 pub use planner::{ClearanceSearch, GuidePlanner, LearnAndLink};
 pub use request::{GuideEnd, GuideRequest, NoGuide, UnguidedOption};
 pub use reward::{Place, ProgressReward, PseudoReward, Reward, StepEvents, Transition};
-pub use route::{joining, ridge_routes, route_beyond, routes};
+pub use route::{joining, ridge_routes, route_beyond, routes, shortest_way_m};
 pub use settings::{GuideSettings, PlannerKind};
 pub use sharp_motion::Steering;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use sharp_guide::{Departure, GuideSettings, GuidedOption, join_guides};
 use sharp_options::OptionKind;
-use sharp_space::{CollisionChecker, Point, Pose};
+use sharp_space::{Point, Pose};
 use worlds::{Drawn, HALL, Problem, RING, along};
 
 /// Two halls with a door of two cells between them, and four regions in a row.
@@ -97,7 +97,9 @@ fn a_narrow_door_takes_the_margin_from_the_options_beside_it_alone() {
     let widest = &*drawn.robot().inflated[0].geometry;
     let has_margin: Vec<bool> = joined
         .iter()
-        .map(|option| option.guide.poses().windows(2).all(|pair| widest.is_segment_free(pair[0], pair[1], 0.05)))
+        .map(|option| {
+            option.guide.poses().windows(2).all(|pair| widest.is_segment_free(pair[0], pair[1], 0.05))
+        })
         .collect();
     assert_eq!(has_margin, [true, true, false, true, true], "{plan:?}");
     for pair in joined.windows(2) {
@@ -110,12 +112,12 @@ fn a_narrow_door_takes_the_margin_from_the_options_beside_it_alone() {
 
 #[test]
 fn behind_a_beginning_that_is_driven_with_care_all_others_are_joined() {
-    let drawn = Drawn::new(HALL, OptionKind::Centroid);
-    let mut alone = drawn.plan(&["first:0", "c:0-1", "c:1-2", "last:2"], along());
+    let drawn = Drawn::new(RING, OptionKind::Centroid);
+    let mut alone = drawn.plan(&["first:2", "c:2-3", "c:3-1", "last:1"], around());
     let careful = Departure { careful_m: 0.5, ..Departure::default() };
     alone[0] = Arc::new(GuidedOption::clone(&alone[0]).with_departure(careful));
-    let joined = joined(&drawn, &alone, along().start);
+    let joined = joined(&drawn, &alone, around().start);
     assert!(Arc::ptr_eq(&joined[0], &alone[0]), "it stays as it was");
-    assert!(joined[1..].iter().zip(&alone[1..]).all(|(after, before)| after.guide != before.guide));
+    assert!(joined[1..].iter().zip(&alone[1..]).all(|(after, before)| after.guide != before.guide), "joined");
     assert!(joined[0].guide.end().distance_m(&joined[1].guide.start()) < 1e-9, "a gap");
 }

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use sharp_drive::SuccessEstimate;
-use sharp_guide::{GuidedOption, LegId, join_guides};
+use sharp_guide::{GuidedOption, LegId, join_guides, shortest_way_m};
 
 use crate::abstraction::Abstraction;
 use crate::files::FileError;
@@ -22,7 +22,7 @@ use crate::query::Phase;
 use crate::reason::{Gap, fits, narrowest_gap, obstruction, unturned};
 use crate::repair::{ENTERED_MIN, Repair, repair};
 use crate::search::Search;
-use crate::verify::{PlannedOption, Solution, composed, predict, verify};
+use crate::verify::{Solution, composed, predict, verify};
 
 /// Plans looked at before the best so far is taken.
 const ATTEMPTS_MAX: usize = 24;
@@ -35,6 +35,9 @@ const COMPOSED_MAX: usize = 2;
 const COMPOSED_WELL: [f64; 2] = [0.95, 0.98];
 /// And only if start and goal are no further apart, metres: the guide of a longer way takes longer than the rest of an answer.
 const COMPOSED_DIRECT_M: f64 = 25.0;
+
+/// Composed plans that are longer than this many times the shortest way are compared with the direct way too.
+const DETOUR: f64 = 1.35;
 
 /// A plan that succeeds less often is no plan, share of runs.
 const LEAST_SUCCESS: f64 = 0.01;
@@ -111,8 +114,8 @@ fn algorithm_1(
     };
     let mut policies = Policies::new(library);
     let mut most = if method.verify_episodes == 0 { COMPOSED_MAX } else { VERIFIED_MAX };
-    let (mut best, mut verified): (Option<Solution>, usize) = (None, 0);
-    let mut chosen = vec![];
+    let mut best: Option<Solution> = None;
+    let (mut chosen, mut measured): (_, Vec<Vec<LegId>>) = (vec![], vec![]);
     for _ in 0..ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
         let Some((_, p)) = cheapest(problem, &mut search, &policies) else {
@@ -136,14 +139,15 @@ fn algorithm_1(
             return Ok(Outcome::Stopped);
         }
         // 17: the cost of an option is now what was measured, so a weak one may have a better alternative.
-        let other_s = |search: &mut Search<'_>, policies: &Policies<'_>| {
-            let other = cheapest(problem, search, policies).filter(|(_, other)| names(other) != names(&p));
-            other.map_or(f64::INFINITY, |(seconds, _)| seconds)
+        let other_s = |search: &mut Search<'_>, policies: &Policies<'_>, measured: &[Vec<LegId>]| {
+            let other = cheapest(problem, search, policies);
+            let is_new = |legs: &Vec<LegId>| *legs != names(&p) && !measured.contains(legs);
+            other.filter(|(_, other)| is_new(&names(other))).map_or(f64::INFINITY, |(seconds, _)| seconds)
         };
         let is_composed = method.verify_episodes == 0;
         if !is_composed
             && has_weak_option(problem, &p, &policies)
-            && other_s(&mut search, &policies).is_finite()
+            && other_s(&mut search, &policies, &measured).is_finite()
         {
             continue;
         }
@@ -155,19 +159,23 @@ fn algorithm_1(
             true => predict(problem, &p, &mut policies, known),
             false => verify(problem, &p, &policies),
         };
-        verified += 1;
+        measured.push(names(&p));
         let is_near = query.start.distance_m(&query.goal) <= COMPOSED_DIRECT_M;
-        if !is_composed || (is_near && solution.composed.as_ref().is_some_and(fails_often)) {
+        let may_be_poor = || solution.composed.as_ref().is_some_and(fails_often) || is_detour(problem, &p);
+        if !is_composed || (is_near && may_be_poor()) {
             most += usize::from(search.offer_direct() && is_composed);
         }
-        charge_hand_overs(&mut search, &solution.steps, method.failure_cost_s);
+        charge_hand_overs(&mut search, &solution, method.failure_cost_s);
         let cost_s = |solution: &Solution| solution.cost_s(method.failure_cost_s);
         if best.as_ref().is_none_or(|best| cost_s(&solution) < cost_s(best)) {
             best = Some(solution);
             chosen.clone_from(&p);
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
-        if is_stopped || verified == most || best_s <= method.retry_above * other_s(&mut search, &policies) {
+        if is_stopped
+            || measured.len() == most
+            || best_s <= method.retry_above * other_s(&mut search, &policies, &measured)
+        {
             break;
         }
     }
@@ -189,6 +197,14 @@ fn fails_often(odds: &ComposedOdds) -> bool {
     let known = odds.pieces.len().saturating_sub(1);
     let between = odds.pieces.iter().take(known).skip(1).map(|piece| piece.success);
     odds.success < whole || between.product::<f64>() < on_the_way
+}
+
+/// Whether `plan` is so much longer than the shortest way that the direct way may be better.
+fn is_detour(problem: &PlanningProblem<'_>, plan: &[Arc<GuidedOption>]) -> bool {
+    let PlanningProblem { world, query, .. } = *problem;
+    let shortest_m = shortest_way_m(&world.guide_robot(), query.start.position, query.goal.position);
+    let plan_m: f64 = plan.iter().map(|leg| leg.guide.length_m()).sum();
+    shortest_m.is_ok_and(|shortest_m| plan_m > DETOUR * shortest_m)
 }
 
 fn names(plan: &[Arc<GuidedOption>]) -> Vec<LegId> {
@@ -225,9 +241,17 @@ fn has_weak_option(
 }
 
 /// What options succeed less often on arrival than by themselves is the price of their hand-overs.
-fn charge_hand_overs(search: &mut Search<'_>, steps: &[PlannedOption], failure_cost_s: f64) {
-    for pair in steps.windows(2) {
+fn charge_hand_overs(search: &mut Search<'_>, solution: &Solution, failure_cost_s: f64) {
+    let steps = &solution.steps;
+    for (number, pair) in steps.windows(2).enumerate() {
         let [before, after] = pair else { continue };
+        // What a composed piece of several hand-overs loses belongs to its last leg.
+        let ends_here =
+            |odds: &ComposedOdds| odds.pieces.iter().any(|piece| piece.until == number as f64 + 1.5);
+        let is_last = number + 2 == steps.len();
+        if !is_last && solution.composed.as_ref().is_some_and(|odds| !ends_here(odds)) {
+            continue;
+        }
         // A few episodes say little: only what they rule out is charged.
         let loss = after.learnt.estimate.count.lower95() - after.on_arrival.rate();
         if after.on_arrival.episodes >= ENTERED_MIN && loss > 0.0 {
@@ -342,7 +366,7 @@ mod tests {
         let Outcome::Solved(solution) = outcome else { panic!("{outcome:?}") };
         let context = PolicyContext::new(&NoiseModel::nominal(), 1.0);
         let cautious = prior_interface(&sharp_sim::RobotModel::husky(), context);
-        for PlannedOption { option, learnt, .. } in &solution.steps {
+        for crate::PlannedOption { option, learnt, .. } in &solution.steps {
             let OptionPolicy::Network(NetworkPolicy { interface, .. }) = &learnt.policy else {
                 panic!("{}: a follower", option.id)
             };

@@ -14,8 +14,8 @@ use sharp_sim::SimulatorKind;
 
 use crate::learn::{OptionLearner, PaperProtocol, PriorOnly, Selection};
 
-/// Prices are not exact, and rather too high: a plan is tried though its price is up to 1.18 times what the best one cost.
-const RETRY_ABOVE: f64 = 0.85;
+/// Prices are not exact, and rather too high: a plan is tried though its price is up to 1.4 times what the best one cost.
+const RETRY_ABOVE: f64 = 0.7;
 
 /// How fast legs without a guide are thought to be driven where an answer is wanted at once, as a share of the top speed.
 const UNGUIDED_SPEED: f64 = 0.6;

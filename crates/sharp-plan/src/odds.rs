@@ -1,6 +1,6 @@
 //! The odds of a plan without a run from end to end: composed of what its parts are known to hold.
 //!
-//! A plan is cut in the middle of each of its options. The pieces between two cuts were driven when the building was
+//! A plan is cut in the middle of its options, but for those near its start and its goal. The pieces between two cuts were driven when the building was
 //! learnt ([`HandOver`](crate::HandOver)); the first and the last piece belong to this plan alone and are driven a few
 //! times, beside what the cost model says of them. The success of the plan is the product, its time the sum: each
 //! piece counts only robots that came to its first cut as plans make them come there.
@@ -33,6 +33,8 @@ const STAND_IN_BELOW: f64 = 0.985;
 /// average, as the price says, and less than 0.98 for one in forty. Of 55 with a price from 0.985 on it was less than 0.93 for
 /// one in forty. Where some fail, runs alone count: the model knows little of places where a robot barely fits.
 const TRUSTED: [(f64, f64); 3] = [(0.995, 96.0), (0.985, 32.0), (0.0, 16.0)];
+/// Way from the last cut to the last leg at least, metres.
+const LEAD_M: f64 = 1.5;
 /// States in which the option before a last leg begins.
 const STATE_POOL: usize = 8;
 /// How they spread: as robots pass there.
@@ -165,9 +167,10 @@ pub(crate) fn compose(
 fn cuts(plan: &[Arc<GuidedOption>]) -> Vec<(Option<usize>, usize)> {
     let whole = plan.len();
     let options: Vec<usize> = (0..whole).filter(|&index| plan[index].id.role() == Role::Option).collect();
-    let (Some(first), Some(&last)) = (first_cut(plan, &options), options.last()) else {
+    let (Some(first), Some(last)) = (first_cut(plan, &options), last_cut(plan, &options)) else {
         return vec![(None, whole)];
     };
+    let last = last.max(first);
     let between = (first..last).map(|cut| (Some(cut), cut + 1));
     std::iter::once((None, first)).chain(between).chain([(Some(last), whole)]).collect()
 }
@@ -256,6 +259,20 @@ fn first_cut(plan: &[Arc<GuidedOption>], options: &[usize]) -> Option<usize> {
         way_m += length_m;
     }
     options.last().copied()
+}
+
+/// The option in whose middle a robot has so much way to the last leg that the joined guide until there does not depend on it:
+/// behind a short option the last leg bends what comes before. If all options together are too short, the first.
+fn last_cut(plan: &[Arc<GuidedOption>], options: &[usize]) -> Option<usize> {
+    let mut way_m = 0.0;
+    for &index in options.iter().rev() {
+        let length_m = plan[index].guide.length_m();
+        if way_m + 0.5 * length_m >= LEAD_M {
+            return Some(index);
+        }
+        way_m += length_m;
+    }
+    options.first().copied()
 }
 
 /// The piece of `plan` from the middle of leg `from`, or from the start, to the middle of leg `to`, or to the goal where there

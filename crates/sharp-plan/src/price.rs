@@ -24,7 +24,7 @@ pub(crate) struct Pricer<'a> {
     world: &'a World,
     noise: NoiseModel,
     settings: SearchSettings,
-    failure_cost_s: f64,
+    pub(crate) failure_cost_s: f64,
     /// How fast a robot of this kind drives under the noise.
     profile: SpeedProfile,
 }

@@ -151,6 +151,9 @@ fn beside(frame: &GridFrame, Cell { row, col }: Cell) -> impl Iterator<Item = Ce
 fn narrowest_place(world: &World, query: &Query) -> Option<Point> {
     let frame = world.grid.frame();
     let ends = (around(world, query.start.position)?, around(world, query.goal.position)?);
+    if ends.0.iter().any(|cell| ends.1.contains(cell)) {
+        return Some(query.start.position);
+    }
     let place = world.geometry.clearance().widest_paths().narrowest_between(&ends.0, &ends.1)?;
     Some(frame.center(place))
 }

@@ -7,7 +7,7 @@
 //! find are looked for where there is no plan without them.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use rayon::prelude::*;
 use sharp_drive::{Driver, InitialStates, SuccessEstimate, World};
@@ -92,8 +92,10 @@ pub struct Search<'a> {
     chosen: OnceLock<Option<usize>>,
     /// If no way did well for a leg: the best of the first such leg.
     least_bad: OnceLock<LeastBad>,
+    /// Where an answer is wanted at once: how often legs came out of a tight start, where that was not often enough.
+    seen_to_fail: Mutex<BTreeMap<LegId, f64>>,
     /// The direct way without its first metres, which all ways out of the start join.
-    beyond: OnceLock<Option<GuidePath>>,
+    beyond: OnceLock<Result<GuidePath, NoGuide>>,
     /// Whether a plan may go from start to goal without any option though they lie in different states.
     offers_direct: bool,
     /// Options that are at hand from the beginning, the same for every search of a building.
@@ -173,6 +175,7 @@ impl<'a> Search<'a> {
             is_hurried: false,
             chosen: OnceLock::new(),
             least_bad: OnceLock::new(),
+            seen_to_fail: Mutex::default(),
             beyond: OnceLock::new(),
             offers_direct: false,
             known: None,
@@ -356,7 +359,10 @@ impl<'a> Search<'a> {
         let cost_s = match self.found(option.id()) {
             Some(Ok(_)) => {
                 let price = self.price(option.id()).expect("a guided option is priced");
-                let cost_s = self.pricer.cost_s(price, measured.as_ref());
+                let seen = self.seen_to_fail.lock().expect("no panic").get(&id).copied();
+                let seen = seen.filter(|_| measured.is_none());
+                let lost = seen.map_or(0.0, |success| (price.parts().1 - success).max(0.0));
+                let cost_s = self.pricer.cost_s(price, measured.as_ref()) + lost * self.pricer.failure_cost_s;
                 cost_s.max(if measured.is_some() { least_s } else { unguided_s })
             }
             Some(Err(_)) => return f64::INFINITY,
@@ -413,6 +419,9 @@ impl<'a> Search<'a> {
         let chosen = self.chosen.get().copied().or_else(least_bad);
         let again = chosen.flatten().and_then(|way| self.departures().get(way));
         if let Some(option) = again.and_then(|way| self.departing(candidate, way)) {
+            if let Some(way) = self.least_bad.get().filter(|_| self.chosen.get().is_none()) {
+                self.seen_to_fail.lock().expect("no panic").insert(id, way.success);
+            }
             return Ok(Arc::new(option));
         }
         let at_once = self.plan_from(candidate, self.query.start, self.planner());
@@ -485,6 +494,8 @@ impl<'a> Search<'a> {
             let _ = self.chosen.set(number);
         } else {
             let _ = self.least_bad.set(LeastBad { number, success: tried.success });
+            let mut seen = self.seen_to_fail.lock().expect("no panic");
+            seen.insert(candidate.id(), tried.success);
         }
         Ok(tried.option)
     }
@@ -562,9 +573,10 @@ impl<'a> Search<'a> {
         let (departure, lead) = way;
         // There are many ways out. With samples beyond each of them a start that is tight took minutes.
         let start = *lead.last()?;
+        let is_direct = candidate.id() == LegId::Direct && self.settings.direct;
         let is_far = start.distance_m(&self.query.goal) >= JOINED_FROM_M;
-        let rest = if candidate.id() == LegId::Direct && self.settings.direct && is_far {
-            joining(&self.world.guide_robot(), start, self.beyond()?)?
+        let rest = if self.is_hurried && is_direct && is_far {
+            joining(&self.world.guide_robot(), start, self.beyond(candidate.option.end).ok()?)?
         } else {
             self.plan_from(candidate, start, self.hasty()).ok()?
         };
@@ -575,11 +587,10 @@ impl<'a> Search<'a> {
     }
 
     /// The direct way without its first metres.
-    fn beyond(&self) -> Option<&GuidePath> {
-        let heading = self.goal.heading.map(|(heading, _)| heading);
-        let goal = (self.graph.candidate(LegId::Direct)?.option.end, heading);
-        let plan = || route_beyond(&self.world.guide_robot(), self.query.start.position, goal).ok();
-        self.beyond.get_or_init(plan).as_ref()
+    fn beyond(&self, end: Point) -> Result<&GuidePath, NoGuide> {
+        let goal = (end, self.goal.heading.map(|(heading, _)| heading));
+        let plan = || route_beyond(&self.world.guide_robot(), self.query.start.position, goal);
+        self.beyond.get_or_init(plan).as_ref().map_err(Clone::clone)
     }
 
     /// A guide for the leg `candidate` for a robot at `start`.
@@ -594,8 +605,9 @@ impl<'a> Search<'a> {
             // What fails near the start need not be searched to a far goal with every margin.
             let is_far = start.distance_m(&self.query.goal) >= JOINED_FROM_M;
             if self.is_hurried && is_far {
-                let begins = |beyond| joining(&self.world.guide_robot(), start, beyond);
-                self.beyond().and_then(begins).ok_or(NoGuide::Unreachable)?;
+                let beyond = self.beyond(candidate.option.end)?;
+                let begins = joining(&self.world.guide_robot(), start, beyond);
+                begins.ok_or(NoGuide::LeadIn(start.position))?;
             }
             let expansions = if at_once { EXPANSIONS } else { EXPANSIONS_DEPARTING };
             return self.direct_route(start, candidate.option.end, expansions);

@@ -106,7 +106,7 @@ impl WidestPaths {
     }
 
     /// The same between two places of several cells: a cell with the least distance on the way from any of `from` to any of
-    /// `to` whose least distance is largest; `None` if no way joins them. A cell of both is its own way.
+    /// `to` whose least distance is largest; `None` if no way joins them. Where they share cells it is one of those.
     ///
     /// # Panics
     /// If a cell lies outside the field.
