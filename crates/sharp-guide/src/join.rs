@@ -55,7 +55,7 @@ pub fn join_guides(
         goal: GuideEnd { position: last.guide.end().position, heading: goal_heading(last) },
     };
     let mut guides: Vec<Option<GuidePath>> = vec![None; options.len()];
-    Chain::new(&options, robot, settings).join(usize::from(is_careful)..options.len(), ends, &mut guides);
+    LegChain::new(&options, robot, settings).join(usize::from(is_careful)..options.len(), ends, &mut guides);
     let with = |(option, guide): (Arc<GuidedOption>, Option<GuidePath>)| match guide {
         Some(guide) => Arc::new(GuidedOption { guide, ..GuidedOption::clone(&option) }),
         None => option,
@@ -71,7 +71,7 @@ struct RunEnds {
 }
 
 /// Options that follow one another.
-struct Chain<'a> {
+struct LegChain<'a> {
     options: &'a [Arc<GuidedOption>],
     robot: &'a GuideRobot<'a>,
     settings: &'a GuideSettings,
@@ -92,7 +92,7 @@ struct JoinedPath {
     faults_m: Vec<f64>,
 }
 
-impl<'a> Chain<'a> {
+impl<'a> LegChain<'a> {
     fn new(options: &'a [Arc<GuidedOption>], robot: &'a GuideRobot<'a>, settings: &'a GuideSettings) -> Self {
         let allowed = options.iter().flat_map(|option| option.allowed.iter().copied()).collect();
         let sources = options.iter().filter_map(|option| option.source.as_ref()).collect();

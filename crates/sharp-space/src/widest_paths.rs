@@ -182,9 +182,9 @@ mod tests {
                 let found = paths.narrowest(a, b).map_or(0.0, |cell| field.at(cell));
                 assert_eq!(found, by_floods(&field, a, b), "{a:?} to {b:?} in\n{}", drawing.join("\n"));
                 if found > 0.0 {
-                    joined += 1
+                    joined += 1;
                 } else {
-                    apart += 1
+                    apart += 1;
                 }
                 assert_eq!(paths.narrowest_between(&[a], &[b]), paths.narrowest(a, b));
                 let (c, d) = (cell(), cell());
