@@ -3,8 +3,8 @@
 //! The guide of an option is planned for the option alone, through the centres of its sets. In a plan the robot
 //! comes from somewhere and goes on to somewhere. So the guides of the plan are smoothed together and cut where
 //! they come nearest to those centres. Where the joined path fails at a place, the options around it alone are smoothed
-//! again in the other ways, with the same margin and then with smaller ones. Where that fails too, the options there keep their own guides, and those before and
-//! behind are joined. The library keeps the guides as they were planned.
+//! again with other weights, first with the same margin and then with smaller ones. Where that fails too, the options
+//! there keep their own guides, and those before and behind are joined. The library keeps the guides as they were planned.
 
 use std::cell::Cell as Memory;
 use std::collections::BTreeSet;
