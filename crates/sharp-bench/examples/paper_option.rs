@@ -18,6 +18,8 @@
 //! * `normalise=true`: observations are normalised by those of the warm-up.
 //! * `hidden=64`, `batch=128`, `rate=1e-3`, `gamma=0.97`, `tau=0.01`, `nstep=3`, `warmup=1000`, `alpha=0.05`, `updates=0.5`:
 //!   units of each hidden layer, transitions of a gradient step, learning rate, and the other settings of `SacSettings`.
+//! * `best=return`: of the policies that do not meet the stop, arriving counts as much as success.
+//! * `restart=25000`: fresh networks after so many steps without a mean return above 0, while twice as many are left.
 //! * `until=free`: training goes on until the share of 0.95 succeeds without contact.
 //! * `steps=60000`, `seed=1`: the budget, and the root of all randomness.
 
@@ -37,7 +39,10 @@ use sharp_options::OptionKind;
 use sharp_plan::{
     Conditions, LearnFailure, LearningMonitor, LearningTask, LearntPolicy, Method, OptionLearner, Query,
 };
-use sharp_rl::{Actor, Evaluation, Normalisation, StopRule, TrainError, TrainSettings, evaluate, train};
+use sharp_rl::{
+    Actor, BestRule, Evaluation, Normalisation, RestartRule, StopRule, TrainError, TrainSettings, evaluate,
+    train,
+};
 use sharp_sim::{RobotState, SimulatorKind};
 use sharp_space::Seed;
 
@@ -128,6 +133,10 @@ impl LegExperiment {
                 "alpha" => experiment.train.sac.initial_alpha = value.parse()?,
                 "updates" => experiment.train.sac.updates_per_step = value.parse()?,
                 "rate" => experiment.train.sac.learning_rate = value.parse()?,
+                "best" if value == "return" => experiment.train.best = BestRule::ReturnAndSuccess(1_000.0),
+                "restart" => {
+                    experiment.train.restart = Some(RestartRule { after: value.parse()?, below: 0.0 });
+                }
                 "until" if value == "free" => experiment.until_free = true,
                 "steps" => experiment.train.max_env_steps = value.parse()?,
                 "seed" => experiment.seed = Seed(value.parse()?),
@@ -156,7 +165,7 @@ impl LegExperiment {
         train(&mut [learnt], &self.train, &mut rng, &mut |progress| {
             let Some(evaluation) = progress.evaluation else { return ControlFlow::Continue(()) };
             let cpu_s = cpu_seconds();
-            if best.as_ref().is_none_or(|best| evaluation.beats(&best.0)) {
+            if best.as_ref().is_none_or(|best| self.train.best.prefers(&evaluation, &best.0)) {
                 best = Some((evaluation, progress.actor.clone()));
             }
             let (_, actor) = best.as_ref().expect("just set");

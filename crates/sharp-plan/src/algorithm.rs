@@ -285,13 +285,17 @@ mod tests {
     use std::sync::Mutex;
 
     use sharp_drive::{NetworkPolicy, OptionPolicy, PolicyContext, prior_interface};
+    use sharp_guide::Role;
     use sharp_options::OptionKind;
+    use sharp_rl::StopReason;
     use sharp_sim::NoiseModel;
     use sharp_space::{Pose, Seed};
 
     use super::*;
     use crate::conditions::Conditions;
-    use crate::learn::{LearntPolicy, Selection};
+    use crate::learn::{
+        LearnFailure, LearningMonitor, LearningTask, LearntPolicy, OptionLearner, Selection, Training,
+    };
     use crate::method::{Method, RepairSettings};
     use crate::query::{Monitor, Query};
     use crate::test_worlds::{HALL, SEALED, along, world};
@@ -375,6 +379,57 @@ mod tests {
             assert_eq!(effort, (100, 0), "{}", option.id);
         }
         assert!(solution.predicted.rate() > 0.8, "an open hall is crossed {:?}", solution.predicted);
+    }
+
+    /// Trains in vain, and notes what it was asked for.
+    #[derive(Debug, Default)]
+    struct Hopeless(Mutex<Vec<(LegId, Seed)>>);
+
+    impl OptionLearner for Hopeless {
+        fn learn(
+            &self,
+            task: &LearningTask<'_>,
+            _: &dyn LearningMonitor,
+        ) -> Result<LearntPolicy, LearnFailure> {
+            self.0.lock().unwrap().push((task.option.id, task.seed));
+            let training = Training { stop: StopReason::Steps, mean_return: -1.0, points: vec![] };
+            let useless = LearntPolicy::useless(&task.world.robot);
+            Ok(LearntPolicy { env_steps: 100, training: Some(training), ..useless })
+        }
+    }
+
+    #[test]
+    fn what_was_learnt_in_vain_is_learnt_again_with_another_seed() {
+        let (world, abstraction) = world(HALL, OptionKind::Centroid);
+        let conditions = Conditions::new(&world, NoiseModel::nominal());
+        let learner = Arc::new(Hopeless::default());
+        let method =
+            Method::paper().with_learner("hopeless", Arc::clone(&learner) as _).with_episodes(1, 1, 0);
+        let mut library = OptionLibrary::in_memory();
+        let mut asked = || {
+            let problem = PlanningProblem {
+                world: &world,
+                method: &method,
+                conditions: &conditions,
+                query: along(),
+                seed: Seed(1),
+                monitor: &(),
+            };
+            let outcome = solve(&problem, &abstraction, &mut library).expect("no files");
+            assert!(
+                matches!(outcome, Outcome::Solved(_)),
+                "the paper keeps whatever was learnt: {outcome:?}"
+            );
+            std::mem::take(&mut *learner.0.lock().unwrap())
+        };
+        let (first, second) = (asked(), asked());
+        assert!(first.iter().any(|(id, _)| id.role() == Role::Option), "{first:?}");
+        assert_eq!(first.len(), second.len(), "the same plan, all of it anew");
+        for ((id, seed), (other_id, other_seed)) in first.iter().zip(&second) {
+            assert_eq!(id, other_id);
+            // First and last legs belong to their problem: nobody knows of the other one.
+            assert_eq!(seed != other_seed, id.role() == Role::Option, "{id}");
+        }
     }
 
     #[test]

@@ -26,12 +26,21 @@ impl<'a> Policies<'a> {
         Self { library, learnt: BTreeMap::new(), fresh: BTreeSet::new() }
     }
 
+    /// The policy of the leg called `id`. One of an earlier problem that never succeeded is none: it is learnt again.
     pub(crate) fn get(&self, id: LegId) -> Option<&LearntPolicy> {
-        let stored = || match id {
-            LegId::Option(id) => self.library.get(id).map(|stored| &stored.learnt),
-            _ => None,
-        };
+        let stored = || self.stored(id).filter(|learnt| !learnt.never_succeeded());
         self.learnt.get(&id).or_else(stored)
+    }
+
+    fn stored(&self, id: LegId) -> Option<&LearntPolicy> {
+        let LegId::Option(id) = id else { return None };
+        self.library.get(id).map(|stored| &stored.learnt)
+    }
+
+    /// Environment steps that were spent in vain on the leg called `id` in earlier problems.
+    pub(crate) fn spent_in_vain(&self, id: LegId) -> u64 {
+        let failed = self.stored(id).filter(|learnt| learnt.never_succeeded());
+        failed.map_or(0, |learnt| learnt.env_steps)
     }
 
     /// The policy of an option that has one.
@@ -56,7 +65,8 @@ impl<'a> Policies<'a> {
         if self.get(option.id).is_some() || option.id.role() != Role::Option {
             return Ok(());
         }
-        if let Some(stored) = self.library.adopt(&corridor(option, grid)) {
+        let stored = self.library.adopt(&corridor(option, grid));
+        if let Some(stored) = stored.filter(|stored| !stored.learnt.never_succeeded()) {
             self.keep(option, stored.learnt, grid)?;
             self.fresh.remove(&option.id);
         }
@@ -83,7 +93,7 @@ impl<'a> Policies<'a> {
         if self.get(option.id).is_none() {
             self.fresh.insert(option.id);
         }
-        // Training again would come to the same network, however it does.
+        // What was trained in vain is kept too: the next problem trains with another seed.
         let is_worth_keeping = learnt.estimate.count.successes > 0 || learnt.training.is_some();
         if let (LegId::Option(id), true) = (option.id, is_worth_keeping) {
             let corridor = corridor(option, grid);

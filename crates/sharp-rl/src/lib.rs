@@ -90,6 +90,6 @@ pub use sac_learner::{SacLearner, SacStart};
 pub use sac_state::SacState;
 pub use settings::{Exploration, SacSettings, SettingsError};
 pub use state::{BestNetworks, TrainState};
-pub use stop::{StopReason, StopRule};
+pub use stop::{BestRule, RestartRule, StopReason, StopRule};
 pub use store::{FORMAT_VERSION, StoreError};
 pub use train::{Normalisation, TrainSettings, fine_tune, resume, train};

@@ -5,6 +5,7 @@
 //! [`Environment`](crate::Environment) must be a function of the two.
 
 use rand::SeedableRng;
+use serde::{Deserialize, Serialize};
 
 use crate::buffer::ReplayBuffer;
 use crate::environment::{EnvironmentSpec, Stream};
@@ -36,6 +37,19 @@ pub struct TrainState {
     pub(crate) evaluation_rng: Stream,
     /// Environment steps at the last evaluation; 0 before the first.
     pub(crate) evaluated_at: u64,
+    /// The attempt under way.
+    pub(crate) attempt: Attempt,
+}
+
+/// What a run has done since it began, or began anew ([`RestartRule`](crate::RestartRule)).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Attempt {
+    /// Environment steps of the run before it.
+    pub(crate) began_at: u64,
+    /// Gradient steps of the run before it.
+    pub(crate) updates_before: u64,
+    /// The best mean return of its evaluations; `None` before the first.
+    pub(crate) best_return: Option<f64>,
 }
 
 /// The networks with the best evaluation so far.
@@ -88,7 +102,16 @@ impl TrainState {
             evaluation_rng: fork(),
             records: (0..count).map(|_| record(fork())).collect(),
             evaluated_at: 0,
+            attempt: Attempt::default(),
         }
+    }
+
+    /// Begins anew: fresh networks and an empty buffer. Episodes, counters, streams and the best networks stay.
+    pub(crate) fn begin_anew(&mut self, settings: &SacSettings) {
+        let spec = self.spec();
+        self.sac = SacState::new(spec, settings, &mut Stream::from_rng(&mut self.action_rng));
+        self.buffer = ReplayBuffer::new(spec, settings.buffer_capacity);
+        self.attempt = Attempt { began_at: self.env_steps, updates_before: self.updates, best_return: None };
     }
 
     /// The lengths of observations and actions.

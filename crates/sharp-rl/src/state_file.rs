@@ -8,7 +8,7 @@ use crate::buffer::ReplayBuffer;
 use crate::environment::{EnvironmentSpec, Stream};
 use crate::evaluation::Evaluation;
 use crate::sac_state::SacState;
-use crate::state::{BestNetworks, ReplayRecord, TrainState};
+use crate::state::{Attempt, BestNetworks, ReplayRecord, TrainState};
 use crate::store::{StoreError, TensorReader, TensorWriter};
 
 /// A stream as text: seed and position in 32-bit words.
@@ -67,6 +67,9 @@ struct TrainHeader {
     updates: u64,
     episodes: u64,
     evaluated_at: u64,
+    /// Files from before runs could begin anew have none: theirs is the first.
+    #[serde(default)]
+    attempt: Attempt,
     buffer_capacity: usize,
     buffer_len: usize,
     buffer_next: usize,
@@ -136,6 +139,7 @@ impl TrainState {
             updates: self.updates,
             episodes: self.episodes,
             evaluated_at: self.evaluated_at,
+            attempt: self.attempt,
             buffer_capacity: self.buffer.capacity,
             buffer_len: self.buffer.len(),
             buffer_next: self.buffer.next,
@@ -176,6 +180,7 @@ impl TrainState {
             batch_rng,
             evaluation_rng,
             evaluated_at: header.evaluated_at,
+            attempt: header.attempt,
         })
     }
 }

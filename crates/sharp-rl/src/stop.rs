@@ -1,4 +1,4 @@
-//! When training ends: the rule that an evaluation must meet, and the reason in the end.
+//! When training ends or begins anew, and which policy it returns: the rules for evaluations, and the reason in the end.
 
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +36,47 @@ impl StopRule {
     }
 }
 
+/// Which of the policies that were evaluated a run returns, unless one met the stop rule.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum BestRule {
+    /// The one with the highest success rate, and of equal ones the one with the highest mean return.
+    #[default]
+    Success,
+    /// The one with the highest mean return, with so much added for each success.
+    ///
+    /// For tasks whose successes ask for more than their reward pays for, such as arriving without a contact: a policy that
+    /// always arrives is worth more than one that arrives half of the time, though more often without a contact.
+    ReturnAndSuccess(f64),
+}
+
+impl BestRule {
+    /// Whether it prefers the policy of `evaluation` to that of `other`.
+    #[must_use]
+    pub fn prefers(&self, evaluation: &Evaluation, other: &Evaluation) -> bool {
+        let score = |of: &Evaluation, success: f64| of.mean_return + success * of.success_rate();
+        match *self {
+            Self::Success => evaluation.beats(other),
+            Self::ReturnAndSuccess(success) => score(evaluation, success) > score(other, success),
+        }
+    }
+}
+
+/// When a run begins anew with fresh networks and an empty buffer, because nothing comes of what it has.
+///
+/// Soft actor-critic may settle on a policy that never reaches the goal, and another seed learns the same task
+/// (docs/algorithms/sac.md). An attempt of [`after`](Self::after) steps none of whose evaluations had a mean return of at
+/// least [`below`](Self::below) is given up, while at least twice as many steps are left of the budget.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RestartRule {
+    /// Environment steps of an attempt.
+    pub after: u64,
+    /// The mean return that one of its evaluations must have.
+    pub below: f64,
+}
+
 /// Why training ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -52,6 +93,23 @@ pub enum StopReason {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_best_policy_has_successes_or_a_high_return_as_well() {
+        let of = |successes, mean_return| Evaluation {
+            episodes: 100,
+            successes,
+            mean_return,
+            ..Evaluation::default()
+        };
+        let (halfway, arriving) = (of(30, 400.0), of(6, 970.0));
+        assert!(BestRule::Success.prefers(&halfway, &arriving));
+        assert!(BestRule::ReturnAndSuccess(1000.0).prefers(&arriving, &halfway), "1030 to 700");
+        assert!(BestRule::ReturnAndSuccess(1000.0).prefers(&of(30, 970.0), &arriving), "of equal returns");
+        for rule in [BestRule::Success, BestRule::ReturnAndSuccess(1000.0)] {
+            assert!(!rule.prefers(&halfway, &halfway), "{rule:?}: an equal one is no better");
+        }
+    }
 
     #[test]
     fn every_rule_compares_with_its_own_aim() {

@@ -98,6 +98,10 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
             if self.state.env_steps >= self.settings.max_env_steps {
                 break StopReason::Steps;
             }
+            // Here and not after the evaluation: a run that was saved with it decides the same.
+            if self.is_hopeless() {
+                self.state.begin_anew(&self.settings.sac);
+            }
             self.step_all()?;
             self.learn()?;
             let mut evaluation = None;
@@ -129,6 +133,20 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
         })
     }
 
+    /// Whether the attempt under way is to be given up.
+    fn is_hopeless(&self) -> bool {
+        let Some(rule) = self.settings.restart else { return false };
+        self.attempt_steps() >= rule.after
+            && self.state.evaluated_at == self.state.env_steps
+            && self.state.env_steps + 2 * rule.after <= self.settings.max_env_steps
+            && self.state.attempt.best_return.is_none_or(|best| best < rule.below)
+    }
+
+    /// Environment steps of the attempt under way.
+    const fn attempt_steps(&self) -> u64 {
+        self.state.env_steps - self.state.attempt.began_at
+    }
+
     /// One step in every environment.
     fn step_all(&mut self) -> Result<(), TrainError> {
         for index in 0..self.environments.len() {
@@ -158,12 +176,12 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
     /// Writes the next action of an environment: exploration first, then the policy.
     fn choose_action(&mut self, index: usize) {
         let settings = &self.settings.sac;
-        let rng = &mut self.state.action_rng;
-        let exploration = if self.state.env_steps < settings.warmup_steps {
+        let exploration = if self.attempt_steps() < settings.warmup_steps {
             settings.exploration
         } else {
             Exploration::Policy
         };
+        let rng = &mut self.state.action_rng;
         match exploration {
             Exploration::Uniform => self.action.fill_with(|| rng.random_range(-1.0..=1.0)),
             Exploration::Gaussian(std) => self.action.fill_with(|| {
@@ -221,15 +239,15 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
     /// Makes the updates that the steps so far have earned.
     fn learn(&mut self) -> Result<(), TrainError> {
         let settings = &self.settings.sac;
-        if self.state.env_steps < settings.warmup_steps || self.state.buffer.is_empty() {
+        let (steps, updates_before) = (self.attempt_steps(), self.state.attempt.updates_before);
+        if steps < settings.warmup_steps || self.state.buffer.is_empty() {
             return Ok(());
         }
-        if self.state.updates == 0 && self.settings.normalisation == Normalisation::FromWarmup {
+        if self.state.updates == updates_before && self.settings.normalisation == Normalisation::FromWarmup {
             self.fit_normaliser();
         }
-        let earned =
-            (self.state.env_steps - settings.warmup_steps) as f64 * f64::from(settings.updates_per_step);
-        while self.state.updates < earned as u64 {
+        let earned = (steps - settings.warmup_steps) as f64 * f64::from(settings.updates_per_step);
+        while self.state.updates - updates_before < earned as u64 {
             let state = &mut self.state;
             let how = SampleSettings {
                 gamma: settings.gamma,
@@ -265,7 +283,12 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
             reached = episodes == 0 || confirmation.success_rate() >= rate;
             evaluation = evaluation.pooled(&confirmation);
         }
-        let is_best = self.state.best.as_ref().is_none_or(|best| evaluation.beats(&best.evaluation));
+        let best_return = &mut self.state.attempt.best_return;
+        *best_return =
+            Some(best_return.map_or(evaluation.mean_return, |best| best.max(evaluation.mean_return)));
+        let rule = self.settings.best;
+        let best = self.state.best.as_ref();
+        let is_best = best.is_none_or(|best| rule.prefers(&evaluation, &best.evaluation));
         // The policy that met the rule is returned, even if an earlier one had a better evaluation.
         if is_best || reached {
             self.state.best = Some(BestNetworks { sac: self.state.sac.clone(), evaluation });

@@ -100,6 +100,12 @@ impl LearntPolicy {
         Self::untrained(policy, SuccessEstimate { count, mean_time_s: f64::INFINITY })
     }
 
+    /// Whether it was seen to fail every time.
+    pub(crate) const fn never_succeeded(&self) -> bool {
+        let SuccessCount { episodes, successes } = self.estimate.count;
+        episodes > 0 && successes == 0
+    }
+
     /// The cost that A* uses (line 17), seconds: mean time per success, and `failure_cost_s` for each failure.
     ///
     /// The paper takes the mean number of steps, which knows no failure: 0.

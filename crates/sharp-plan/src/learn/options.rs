@@ -62,7 +62,7 @@ fn take_at_hand(
         if policies.get(option.id).is_some() {
             continue;
         }
-        let seed = option_seed(problem, option);
+        let seed = option_seed(problem, option, policies);
         let states = InitialStates::exactly(RobotState::at_rest(option.guide.start()));
         if let Some(policy) = problem.method.learner.at_hand(&task(problem, option, states, seed)) {
             let estimate = SuccessEstimate { count: SuccessCount::default(), mean_time_s: f64::INFINITY };
@@ -82,7 +82,7 @@ fn learn_chained(
 ) -> Result<bool, FileError> {
     let mut arrivals = vec![RobotState::at_rest(problem.query.start); ARRIVALS];
     for (index, option) in plan.iter().enumerate() {
-        let (next, seed) = (plan.get(index + 1), option_seed(problem, option));
+        let (next, seed) = (plan.get(index + 1), option_seed(problem, option, policies));
         if policies.get(option.id).is_none() {
             let states = initial_states(problem, option, seed).with_arrivals(arrivals.clone());
             let task = LearningTask { next, ..task(problem, option, states, seed) };
@@ -107,7 +107,7 @@ fn learn_independent(
 ) -> Result<bool, FileError> {
     let folder = policies.trainings();
     let learn_alone = |option: &Arc<GuidedOption>| {
-        let seed = option_seed(problem, option);
+        let seed = option_seed(problem, option, policies);
         let task = task(problem, option, initial_states(problem, option, seed), seed);
         // The others go on: what can be learnt is learnt.
         learn(problem, &task, folder)
@@ -218,8 +218,9 @@ fn take(
     Ok(true)
 }
 
-fn option_seed(problem: &PlanningProblem<'_>, option: &GuidedOption) -> Seed {
-    problem.seed.child(&format!("leg {}", option.id), 0)
+/// The root of the random streams for learning `option`; another one after it was learnt in vain.
+fn option_seed(problem: &PlanningProblem<'_>, option: &GuidedOption, policies: &Policies<'_>) -> Seed {
+    problem.seed.child(&format!("leg {}", option.id), policies.spent_in_vain(option.id))
 }
 
 /// The task of learning `option` from `states`, with nothing known of what comes after it.
