@@ -12,6 +12,7 @@
 //!
 //! * `simulator=kinematic`: where it is learnt; rapier2d otherwise.
 //! * `contact=-10`: added to the reward of each step with a contact; an episode with a contact is no success then.
+//! * `heading=-300`: added in the termination set for each radian off the guide's heading there.
 //! * `still=true`: an episode in which the robot stands still is out of time.
 //! * `starts=centre`: episodes begin at rest where the guide does, not spread over the initiation set.
 //! * `scale=0.01`: rewards are multiplied inside the algorithm; the task stays the same.
@@ -118,6 +119,7 @@ impl LegExperiment {
             match name {
                 "simulator" => experiment.simulator = value.parse()?,
                 "contact" => experiment.reward.contact = value.parse()?,
+                "heading" => experiment.reward.heading = value.parse()?,
                 "still" => experiment.ends_at_standstill = value.parse()?,
                 "starts" if value == "centre" => experiment.starts_at_centre = true,
                 "scale" => experiment.train.sac.reward_scale = value.parse()?,

@@ -24,7 +24,7 @@ use sharp_drive::{
     prior_interface,
 };
 use sharp_guide::{GuidedOption, ProgressReward, PseudoReward, Reward, Role};
-use sharp_plan::{Conditions, LearningTask, Method, Plan, TUNED_CONTACT};
+use sharp_plan::{Conditions, LearningTask, Method, Plan, TUNED_REWARD};
 use sharp_rl::{
     Actor, Environment, Evaluation, StopRule, Stream, TrainError, TrainSettings, evaluate, train,
 };
@@ -115,8 +115,7 @@ impl PeerTask {
     /// The paper's observation, action, reward and simulator; `is_tuned`, with what the tuned mode changes of them.
     fn paper_task(&self, is_tuned: bool, seed: Seed) -> OptionTask {
         let interface = PolicyInterface::Absolute { reach_m: self.plan.world.robot.waypoint_reach_m };
-        let paper = PseudoReward::default();
-        let reward = if is_tuned { PseudoReward { contact: TUNED_CONTACT, ..paper } } else { paper };
+        let reward = if is_tuned { TUNED_REWARD } else { PseudoReward::default() };
         let scenario = self.scenario(interface, Arc::new(reward));
         let simulator = self.plan.world.simulator(Method::paper().simulator);
         self.task(Scenario { simulator, ends_at_standstill: is_tuned, ..scenario }, seed)

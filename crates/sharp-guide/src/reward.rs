@@ -62,21 +62,26 @@ pub struct PseudoReward {
     /// Added for each step in which the robot touched an obstacle, 0 or less. The paper has no such term: 0. Where there is one
     /// an episode with a contact is no success, though `r_t` is paid.
     pub contact: f64,
+    /// Added in the termination set for each radian between the robot's heading and that of the guide's end, 0 or less. The
+    /// paper has no such term: 0. The next option begins with the heading with which this one ends.
+    pub heading: f64,
 }
 
 impl Default for PseudoReward {
     /// The paper's values.
     fn default() -> Self {
-        Self { success: 1000.0, stray: -100.0, contact: 0.0 }
+        Self { success: 1000.0, stray: -100.0, contact: 0.0, heading: 0.0 }
     }
 }
 
 impl PseudoReward {
-    /// R(x): `r_t`, `r_p`, or −(d(x, n(x)) + d(n(x), pₙ)) in metres, straight distances both.
+    /// R(x): `r_t` less what the heading costs, `r_p`, or −(d(x, n(x)) + d(n(x), pₙ)) in metres, straight distances both.
     #[must_use]
     pub fn value(&self, guide: &GuidePath, pose: &Pose, place: Place) -> f64 {
         match place {
-            Place::Termination => self.success,
+            Place::Termination => {
+                self.success + self.heading * pose.heading.turn_to(guide.end().heading).abs()
+            }
             Place::Astray => self.stray,
             Place::Allowed => {
                 let nearest = guide.poses()[guide.nearest(pose.position)];
@@ -196,6 +201,14 @@ mod tests {
         // n(x) is the point at x = 4: 3.0067 m away, then 6 m to the end.
         let expected = -(trig::hypot(0.2, 3.0) + 6.0);
         assert!((reward.value(&guide, &pose, Place::Allowed) - expected).abs() < 1e-12, "on the way");
+    }
+
+    #[test]
+    fn arriving_with_another_heading_than_the_guide_pays_less() {
+        let aligned = PseudoReward { heading: -100.0, ..PseudoReward::default() };
+        let value = |heading| aligned.value(&straight(), &Pose::new(9.9, 0.1, heading), Place::Termination);
+        assert_eq!(value(0.0), 1000.0);
+        assert!((value(-0.5) - 950.0).abs() < 1e-9 && (value(0.5) - 950.0).abs() < 1e-9);
     }
 
     #[test]

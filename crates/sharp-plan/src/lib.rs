@@ -78,7 +78,7 @@ pub use learn::{
     PaperProtocol, PriorOnly, Selection, Training, TrainingFile, TrainingPoint,
 };
 pub use library::{FORMAT, LibraryKey, OptionLibrary, StoredOption};
-pub use method::{LearningOrder, Method, PriceRule, RepairSettings, SearchSettings, TUNED_CONTACT};
+pub use method::{LearningOrder, Method, PriceRule, RepairSettings, SearchSettings, TUNED_REWARD};
 pub use odds::{ComposedOdds, PlanPiece};
 pub use option_graph::{Candidate, OptionGraph};
 pub use plan_file::{AbstractionFile, Plan, map_hash};

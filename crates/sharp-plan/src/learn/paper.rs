@@ -53,7 +53,7 @@ impl PaperProtocol {
 
 impl Default for PaperProtocol {
     fn default() -> Self {
-        Self::new(TrainSettings::default())
+        Self::new(TrainSettings::paper())
     }
 }
 
