@@ -1,7 +1,7 @@
 //! `cargo xtask bench peers option`: one option learnt here and by Stable-Baselines3.
 //!
-//! `option.time_to_95` is the time to 95 % success with the paper's observation, reward, networks and
-//! settings on both sides, `option.time_to_stop` that to a mean return of 500; with `.tuned` behind it the
+//! `option.time_to_95` is the time to 95 % success with the paper's observation, reward and networks and
+//! Stable-Baselines3's hyperparameters on both sides, `option.time_to_stop` that to a mean return of 500; with `.tuned` behind it the
 //! same with the settings of `--learning paper-tuned` on both sides. `option.time_to_95.scratch` and
 //! `option.time_to_95.fast` stand what this project does instead against the peer's time in the paper's
 //! form. Both sides of a line learn at the same time: what slows one down slows the other down too.

@@ -5,11 +5,13 @@
 //! paper_option MAP ROBOT KIND PROBLEM LEG [CHANGE=VALUE ...]
 //! ```
 //!
-//! `list` names the legs that `sharp solve --learning paper` would learn first. A leg is learnt with the same seeds as there, and
+//! `list` names the legs that `sharp solve --learning paper` would learn first. A leg is learnt with the same seeds as there, with
+//! the hyperparameters of Stable-Baselines3 unless `base` says otherwise, and
 //! each evaluation prints one JSON object: steps, processor seconds, mean return, whether the paper's stop is met, and how
 //! many of 200 episodes succeed under the best policy until then, with contact allowed and with contact as failure. Training
 //! goes on behind the paper's stop until a share of 0.95 succeeds, so that one run shows what either stop gives. Changes:
 //!
+//! * `base=paper`, `base=absolute`: begins with the settings of `--learning paper` or `paper-tuned`; put it first.
 //! * `simulator=kinematic`: where it is learnt; rapier2d otherwise.
 //! * `contact=-10`: added to the reward of each step with a contact; an episode with a contact is no success then.
 //! * `heading=-300`: added in the termination set for each radian off the guide's heading there.
@@ -19,8 +21,9 @@
 //! * `normalise=true`: observations are normalised by those of the warm-up.
 //! * `hidden=64`, `batch=128`, `rate=1e-3`, `gamma=0.97`, `tau=0.01`, `nstep=3`, `warmup=1000`, `alpha=0.05`, `updates=0.5`:
 //!   units of each hidden layer, transitions of a gradient step, learning rate, and the other settings of `SacSettings`.
-//! * `best=return`: of the policies that do not meet the stop, arriving counts as much as success.
-//! * `restart=25000`: fresh networks after so many steps without a mean return above 0, while twice as many are left.
+//! * `best=return`: the best policy is chosen by mean return + 1,000 x success rate.
+//! * `restart=25000`: training begins anew after so many steps without a mean return above 0, while twice as many are left (so it
+//!   needs `steps=100000`).
 //! * `until=free`: training goes on until the share of 0.95 succeeds without contact.
 //! * `steps=60000`, `seed=1`: the budget, and the root of all randomness.
 
@@ -117,6 +120,18 @@ impl LegExperiment {
         for change in changes {
             let (name, value) = change.split_once('=').unwrap_or((change, ""));
             match name {
+                "base" => {
+                    let base = match value {
+                        "paper" => TrainSettings::paper(),
+                        "absolute" => TrainSettings::absolute(),
+                        _ => return Err(format!("{value:?} is no base, expected paper or absolute").into()),
+                    };
+                    let TrainSettings { max_env_steps, stop, .. } = experiment.train;
+                    experiment.train = base.with(|train| {
+                        train.max_env_steps = max_env_steps;
+                        train.stop = stop;
+                    });
+                }
                 "simulator" => experiment.simulator = value.parse()?,
                 "contact" => experiment.reward.contact = value.parse()?,
                 "heading" => experiment.reward.heading = value.parse()?,

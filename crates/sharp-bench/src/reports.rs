@@ -147,8 +147,9 @@ pub struct OptionReport {
     pub length_m: f64,
     /// Mean simulated time of a success when entered the way the option before arrives, seconds.
     pub time_s: Option<f64>,
-    /// What the search counts: time per success, and the price of failures, seconds.
-    pub cost_s: f64,
+    /// What the search counts: time per success, and the price of failures, seconds; null where it never succeeded and failures
+    /// have no price.
+    pub cost_s: Option<f64>,
     /// What the search took it to cost before it was measured, seconds.
     pub price_s: f64,
 }
@@ -176,7 +177,7 @@ impl OptionReport {
             on_arrival: (*on_arrival).into(),
             length_m: option.guide.length_m(),
             time_s: arrival_time_s.is_finite().then_some(*arrival_time_s),
-            cost_s: learnt.cost_s(plan.method.failure_cost_s),
+            cost_s: Some(learnt.cost_s(plan.method.failure_cost_s)).filter(|cost_s| cost_s.is_finite()),
             price_s,
         }
     }

@@ -84,7 +84,7 @@ pub struct Solved {
 
 /// Algorithm 1 on `problem`, with what the library holds.
 ///
-/// Nothing is written but trainings that take hours ([`Method::keeps_trainings`]) and, into the library, the abstraction:
+/// Nothing is written but trainings that take minutes ([`Method::keeps_trainings`]) and, into the library, the abstraction:
 /// [`Solved::write`] and [`Solved::save_library`] do the rest.
 ///
 /// # Errors
@@ -129,7 +129,7 @@ pub fn solve(
 /// their plan or run none.
 pub(crate) fn with_recovery(tour: &Tour, settings: &SolveSettings) -> Option<Verified> {
     let method = &settings.method;
-    let sticks = method.usable_success == 0.0 || method.verify_episodes == 0;
+    let sticks = method.keeps_all() || method.verify_episodes == 0;
     if sticks || tour.predicted.rate() >= SHAKY {
         return None;
     }
@@ -141,8 +141,7 @@ pub(crate) fn with_recovery(tour: &Tour, settings: &SolveSettings) -> Option<Ver
 
 /// How often `tour` arrives where the robot may touch walls; `None` for methods that do not learn so.
 fn with_contact(tour: &Tour, settings: &SolveSettings) -> Option<Verified> {
-    let is_papers = settings.method.usable_success == 0.0;
-    is_papers.then(|| {
+    settings.method.keeps_all().then(|| {
         let first = &tour.plans[0];
         let mut runs = tour.run_settings(RECOVERY_RUNS, first.seed.child("with contact", 0));
         runs.simulator = first.world.simulator(settings.simulator);

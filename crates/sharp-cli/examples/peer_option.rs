@@ -1,8 +1,8 @@
 //! Our side of `cargo xtask bench peers option`: the longest option of a saved plan, learnt in several
 //! ways.
 //!
-//! `peer_option MAP PLAN paper SEED LIMIT` learns it by the paper's protocol, `tuned` by the same with a
-//! tuned learner, `scratch` in the guide's frame from fresh networks, each for at most `LIMIT` seconds;
+//! `peer_option MAP PLAN paper SEED LIMIT` learns it by the paper's protocol with the hyperparameters of
+//! Stable-Baselines3, `tuned` as `--learning paper-tuned` does (but it never begins anew), `scratch` in the guide's frame from fresh networks, each for at most `LIMIT` seconds;
 //! `fast SEED` does what the default mode does. Each prints one JSON object. `serve paper|tuned SEED` is
 //! the task that is learnt there, for another program: see [`serve`]. Whoever learns is judged by the
 //! same rule, see [`judge`].

@@ -62,6 +62,23 @@ fn a_saved_map_is_the_same_map_and_an_image_finds_its_description() {
 }
 
 #[test]
+fn a_misspelt_key_of_a_map_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_hall(folder.path(), "hall", 0..0);
+    let mut yaml = fs::read_to_string(folder.path().join("hall.yaml")).expect("just written");
+    yaml.push_str("modee: raw\n");
+    fs::write(folder.path().join("odd.yaml"), yaml).expect("a file");
+    let odd = sharp(folder.path(), &["map", "info", "odd.yaml"]);
+    assert!(
+        odd.status.success() && said(&odd).contains("odd.yaml: unknown key \"modee\" is ignored"),
+        "{}",
+        said(&odd)
+    );
+    let sound = sharp(folder.path(), &["map", "info", "hall.yaml"]);
+    assert!(!said(&sound).contains("unknown key"), "{}", said(&sound));
+}
+
+#[test]
 fn maps_are_read_as_an_independent_program_reads_them() {
     if Command::new("python3").arg("--version").output().is_err() {
         eprintln!("SKIPPED: there is no python3");

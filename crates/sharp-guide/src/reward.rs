@@ -75,7 +75,7 @@ impl Default for PseudoReward {
 }
 
 impl PseudoReward {
-    /// R(x): `r_t` less what the heading costs, `r_p`, or −(d(x, n(x)) + d(n(x), pₙ)) in metres, straight distances both.
+    /// R(x): `r_t` minus the cost of the heading, `r_p`, or −(d(x, n(x)) + d(n(x), pₙ)) in metres, straight distances both.
     #[must_use]
     pub fn value(&self, guide: &GuidePath, pose: &Pose, place: Place) -> f64 {
         match place {

@@ -153,8 +153,10 @@ fn searched(
 ) -> Option<GuidePath> {
     let query = MotionQuery { start, goal: Pose::at(goal, start.heading) };
     let path = hybrid_astar(&query, robot.geometry, &robot.steering, settings).path()?;
-    // A path by way of few poses cuts its corners.
-    let mut guides = SPACING_SHARES.into_iter().filter_map(|share| as_guide(&path, &robot.steering, share));
+    // A car's path by way of few poses cuts its corners, so smaller spacings are tried too. For other robots the spacing changes
+    // nothing.
+    let shares = if matches!(robot.steering, Steering::Dubins { .. }) { &SPACING_SHARES[..] } else { &[1.0] };
+    let mut guides = shares.iter().filter_map(|&share| as_guide(&path, &robot.steering, share));
     guides.find(|guide| first_touch(guide, robot.geometry).is_none())
 }
 

@@ -169,6 +169,10 @@ impl LibraryKey<'_> {
         if simulator != SimulatorKind::Kinematic {
             conditions += &format!(" {simulator:?}");
         }
+        // What was trained with other settings is another policy.
+        if method.keeps_trainings {
+            conditions += &format!(" {:?}", method.learner);
+        }
         if let Some(limits) = &world.speed_limits {
             let text = ron::to_string(&**limits).expect("limits are plain numbers");
             conditions += &format!(" {}", files::hash(text.as_bytes()));

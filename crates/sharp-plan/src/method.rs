@@ -30,7 +30,7 @@ const LEARNT_SPEED: f64 = 0.7;
 /// A step with a contact costs 1: with 3 and more, or where a contact ended the episode, robots before a narrow place may learn
 /// to stay where they are. Each radian off the guide's heading in the termination set costs 300, because a car that enters the
 /// next option askew cannot turn: five plans of the Limo arrive in 0.73 of executions, without this cost in 0.46
-/// (docs/algorithms/sac.md).
+/// (docs/decisions/0025-what-the-paper-leaves-open.md).
 pub const TUNED_REWARD: PseudoReward =
     PseudoReward { success: 1000.0, stray: -100.0, contact: -1.0, heading: -300.0 };
 
@@ -50,7 +50,7 @@ pub struct Method {
     pub search: SearchSettings,
     /// In which order the options of a plan are learnt.
     pub order: LearningOrder,
-    /// Whether trainings are kept on disk while they run, because they take hours. A solve that was killed begins anew, from
+    /// Whether trainings are kept on disk while they run, because they take minutes. A solve that was killed begins anew, from
     /// the same library, and finds them.
     pub keeps_trainings: bool,
     /// Fresh episodes that estimate a policy.
@@ -242,7 +242,6 @@ impl Method {
     /// it.
     #[must_use]
     pub fn paper_tuned() -> Self {
-        let heading: f64 = std::env::var("HEADING").map_or(0.0, |h| h.parse().unwrap());
         let protocol = PaperProtocol::new(TrainSettings::absolute())
             .ending_at_standstill()
             .with_reward(Arc::new(TUNED_REWARD));
@@ -304,6 +303,12 @@ impl Method {
         let guide = self.search.guide.unsampled();
         let search = SearchSettings { direct_routes: 1, unguided_speed: UNGUIDED_SPEED, ..self.search };
         Self { verify_episodes: 0, search, ..self }.with_guides(guide)
+    }
+
+    /// Whether a plan is kept even if it rarely succeeds: the paper's rule.
+    #[must_use]
+    pub fn keeps_all(&self) -> bool {
+        self.usable_success == 0.0
     }
 
     /// A composed method with all the patience of the usual one for guides; `None` for one that has it.

@@ -10,6 +10,9 @@ use crate::files::{self, FileError};
 use crate::learn::LearntPolicy;
 use crate::library::{OptionLibrary, StoredOption};
 
+/// Trainings of one option that may come to nothing, each with another seed. After that it counts as impossible.
+const TRAININGS_MAX: u32 = 3;
+
 /// Everything with a policy in this problem.
 #[derive(Debug)]
 pub(crate) struct Policies<'a> {
@@ -26,9 +29,9 @@ impl<'a> Policies<'a> {
         Self { library, learnt: BTreeMap::new(), fresh: BTreeSet::new() }
     }
 
-    /// The policy of the leg called `id`. One of an earlier problem that never succeeded is none: it is learnt again.
+    /// The policy of the leg called `id`. One that was trained without a single success is none while it may be trained again.
     pub(crate) fn get(&self, id: LegId) -> Option<&LearntPolicy> {
-        let stored = || self.stored(id).filter(|learnt| !learnt.never_succeeded());
+        let stored = || self.stored(id).filter(|learnt| !may_train_again(learnt));
         self.learnt.get(&id).or_else(stored)
     }
 
@@ -37,10 +40,9 @@ impl<'a> Policies<'a> {
         self.library.get(id).map(|stored| &stored.learnt)
     }
 
-    /// Environment steps that were spent in vain on the leg called `id` in earlier problems.
-    pub(crate) fn spent_in_vain(&self, id: LegId) -> u64 {
-        let failed = self.stored(id).filter(|learnt| learnt.never_succeeded());
-        failed.map_or(0, |learnt| learnt.env_steps)
+    /// How many trainings of the leg called `id` in the library came to nothing.
+    pub(crate) fn failed_trainings(&self, id: LegId) -> u32 {
+        self.stored(id).map_or(0, LearntPolicy::failed_trainings)
     }
 
     /// The policy of an option that has one.
@@ -66,7 +68,7 @@ impl<'a> Policies<'a> {
             return Ok(());
         }
         let stored = self.library.adopt(&corridor(option, grid));
-        if let Some(stored) = stored.filter(|stored| !stored.learnt.never_succeeded()) {
+        if let Some(stored) = stored.filter(|stored| !may_train_again(&stored.learnt)) {
             self.keep(option, stored.learnt, grid)?;
             self.fresh.remove(&option.id);
         }
@@ -93,7 +95,7 @@ impl<'a> Policies<'a> {
         if self.get(option.id).is_none() {
             self.fresh.insert(option.id);
         }
-        // What was trained in vain is kept too: the next problem trains with another seed.
+        // A failed training is kept too: the next one has another seed.
         let is_worth_keeping = learnt.estimate.count.successes > 0 || learnt.training.is_some();
         if let (LegId::Option(id), true) = (option.id, is_worth_keeping) {
             let corridor = corridor(option, grid);
@@ -103,6 +105,11 @@ impl<'a> Policies<'a> {
         self.learnt.insert(option.id, learnt);
         Ok(())
     }
+}
+
+/// Whether `learnt` is the result of a training that came to nothing and may be tried again.
+fn may_train_again(learnt: &LearntPolicy) -> bool {
+    (1..TRAININGS_MAX).contains(&learnt.failed_trainings())
 }
 
 /// The hash of all that a policy of `option` depends on.

@@ -1,8 +1,9 @@
 //! Hyperparameters of soft actor-critic.
 //!
-//! [`SacSettings::default`] is the paper's setting: two hidden layers of 256 (Sec. 5). What the
-//! paper does not state is the default of Stable-Baselines3, which it used. [`SacSettings::fast`] is
-//! for small tasks on a CPU.
+//! [`SacSettings::default`] has the paper's networks: two hidden layers of 256 (Sec. 5). What the
+//! paper does not state is the default of Stable-Baselines3, which it used;
+//! [`TrainSettings::paper`](crate::TrainSettings::paper) has other values there.
+//! [`SacSettings::fast`] is for small tasks on a CPU.
 
 use std::fmt;
 

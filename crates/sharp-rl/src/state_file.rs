@@ -69,7 +69,7 @@ struct TrainHeader {
     evaluated_at: u64,
     /// Files from before runs could begin anew have none: theirs is the first.
     #[serde(default)]
-    attempt: Attempt,
+    attempt: Option<Attempt>,
     buffer_capacity: usize,
     buffer_len: usize,
     buffer_next: usize,
@@ -139,7 +139,7 @@ impl TrainState {
             updates: self.updates,
             episodes: self.episodes,
             evaluated_at: self.evaluated_at,
-            attempt: self.attempt,
+            attempt: Some(self.attempt),
             buffer_capacity: self.buffer.capacity,
             buffer_len: self.buffer.len(),
             buffer_next: self.buffer.next,
@@ -163,6 +163,14 @@ impl TrainState {
             }
             None => None,
         };
+        let best_return = header.best.as_ref().map(|best| best.1.mean_return);
+        let attempt = header.attempt.unwrap_or(Attempt { best_return, ..Attempt::default() });
+        let Attempt { began_at, updates_before, .. } = attempt;
+        if began_at > header.env_steps || updates_before > header.updates {
+            let what =
+                format!("an attempt from step {began_at} and update {updates_before}, which lie ahead");
+            return Err(StoreError::Header(what));
+        }
         let buffer = read_buffer(&reader, spec, &header)?;
         let episodes = header.records.into_iter().enumerate();
         let records = episodes.map(|(index, episode)| read_record(&reader, index, episode, spec));
@@ -180,7 +188,7 @@ impl TrainState {
             batch_rng,
             evaluation_rng,
             evaluated_at: header.evaluated_at,
-            attempt: header.attempt,
+            attempt,
         })
     }
 }

@@ -46,8 +46,8 @@ pub enum BestRule {
     Success,
     /// The one with the highest mean return, with so much added for each success.
     ///
-    /// For tasks whose successes ask for more than their reward pays for, such as arriving without a contact: a policy that
-    /// always arrives is worth more than one that arrives half of the time, though more often without a contact.
+    /// For tasks where success needs more than the reward measures, such as arriving without a contact: a policy that always
+    /// arrives is worth more than one that arrives half of the time, even if that one touches walls less often.
     ReturnAndSuccess(f64),
 }
 
@@ -63,15 +63,16 @@ impl BestRule {
     }
 }
 
-/// When a run begins anew with fresh networks and an empty buffer, because nothing comes of what it has.
+/// When a run begins anew with fresh networks and an empty buffer, because its policies do not get better.
 ///
 /// Soft actor-critic may settle on a policy that never reaches the goal, and another seed learns the same task
-/// (docs/algorithms/sac.md). An attempt of [`after`](Self::after) steps none of whose evaluations had a mean return of at
-/// least [`below`](Self::below) is given up, while at least twice as many steps are left of the budget.
+/// (docs/decisions/0025-what-the-paper-leaves-open.md). An attempt is given up at the first evaluation after
+/// [`after`](Self::after) steps if none of its evaluations had a mean return of at least [`below`](Self::below), and at least
+/// twice as many steps are left of the budget.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RestartRule {
-    /// Environment steps of an attempt.
+    /// Environment steps of an attempt, at least 1.
     pub after: u64,
     /// The mean return that one of its evaluations must have.
     pub below: f64,

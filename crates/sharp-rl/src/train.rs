@@ -52,9 +52,10 @@ pub struct TrainSettings {
     pub evaluation_episodes: usize,
     /// When to stop before the budget is used up.
     pub stop: StopRule,
-    /// Which of the evaluated policies is returned.
+    /// Which of the evaluated policies is returned if none met the stop rule.
     pub best: BestRule,
-    /// When to begin anew within the budget; `None` for never, as in the paper.
+    /// When to begin anew, with fresh networks, within the budget; `None` for never, as in the paper. A run that goes on with
+    /// networks from elsewhere ([`fine_tune`]) would lose them.
     pub restart: Option<RestartRule>,
 }
 
@@ -88,9 +89,9 @@ impl TrainSettings {
         }
     }
 
-    /// What the paper says (Sec. 5), as [`default`](Self::default), and where it says nothing what learns in coordinates of a map
-    /// with rewards of hundreds: observations and rewards scaled to the size of one, large steps, γ 0.97
-    /// (docs/decisions/0025-what-the-paper-leaves-open.md).
+    /// The paper's settings (Sec. 5), as [`default`](Self::default). Where the paper gives none, settings that learn well in
+    /// coordinates of a map with rewards of hundreds: observations and rewards scaled to the size of one, a learning rate of
+    /// 1e-3, γ 0.97 (docs/decisions/0025-what-the-paper-leaves-open.md).
     #[must_use]
     pub fn paper() -> Self {
         Self {
@@ -106,9 +107,9 @@ impl TrainSettings {
         }
     }
 
-    /// The same with small networks, frequent evaluation, and a stop at 97 % success, confirmed on 500 episodes; fresh networks
-    /// after 25,000 steps without a mean return above 0, which is a robot that hardly ever arrives. Of the policies that do not
-    /// meet the stop, arriving counts as much as success.
+    /// The same with small networks, frequent evaluation, and a stop at 97 % success, confirmed on 500 episodes. Training begins
+    /// anew after 25,000 steps without a mean return above 0, because then the robot hardly ever arrives. If no policy meets
+    /// the stop, the best one is chosen by mean return + 1,000 x success rate.
     #[must_use]
     pub fn absolute() -> Self {
         let paper = Self::paper();
@@ -171,7 +172,8 @@ pub fn fine_tune<E: Environment + Clone>(
 
 /// Continues a run from a saved state, bit for bit as if it had not been interrupted.
 ///
-/// `environments` and `settings` are those of the run. Only its budget and stop rule may differ.
+/// `environments` and `settings` are those of the run. Only its budget and stop rule may differ; with another budget it may
+/// also begin anew at another time.
 ///
 /// # Errors
 /// As [`train`], and if the state belongs to other environments.

@@ -136,7 +136,7 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
     /// Whether the attempt under way is to be given up.
     fn is_hopeless(&self) -> bool {
         let Some(rule) = self.settings.restart else { return false };
-        self.attempt_steps() >= rule.after
+        self.attempt_steps() >= rule.after.max(1)
             && self.state.evaluated_at == self.state.env_steps
             && self.state.env_steps + 2 * rule.after <= self.settings.max_env_steps
             && self.state.attempt.best_return.is_none_or(|best| best < rule.below)

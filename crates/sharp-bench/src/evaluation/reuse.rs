@@ -53,7 +53,7 @@ pub(super) fn figure(lines: &[&ResultLine]) -> Figure {
         name: "reuse",
         title: "Reuse of options (appendix C)",
         caption: "Option uses of all problems of an environment, trials together, and how many were reused. An \
-                  option use is reused if its policy existed before the problem began. The first problem of an \
+                  option use is reused if its policy existed before the problem began and had ever succeeded. The first problem of an \
                   environment reuses nothing; legs from the start and to the goal are no options. The last two columns \
                   count all legs, and those that a learnt policy drives. The paper's \
                   table stands beside it: its maps and problems are others, it does not define its figure, and \

@@ -143,7 +143,7 @@ impl SharpSettings {
         Some(method)
     }
 
-    /// Whether every option is learnt from nothing, which takes hours.
+    /// Whether every option is learnt from nothing, which takes minutes a problem.
     fn trains_everything(&self) -> bool {
         self.method().is_some_and(|method| method.keeps_trainings)
     }

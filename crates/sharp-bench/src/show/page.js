@@ -338,7 +338,7 @@ const percent = share => (100 * share).toFixed(1) + '\u00a0%';
 const seconds = value => value === undefined || value === null ? 'unknown time' : value.toFixed(1) + ' s';
 function legLines(leg) {
   const { on_arrival } = leg;
-  return [`${leg.length_m.toFixed(1)} m in ${seconds(leg.time_s)}, cost ${leg.cost_s.toFixed(1)} s`,
+  return [`${leg.length_m.toFixed(1)} m in ${seconds(leg.time_s)}, cost ${leg.cost_s === null ? 'infinite' : seconds(leg.cost_s)}`,
     `succeeds ${on_arrival.successes} of ${on_arrival.episodes} on arrival (at least ${percent(on_arrival.lower95)})`,
     `policy: ${leg.policy}${leg.reused ? ', from the library' : ''}`,
     `tightest: ${leg.tightest.beside_m.toFixed(2)} m beside the robot`];
@@ -346,7 +346,7 @@ function legLines(leg) {
 function optionLines(option) {
   const it = option.learnt;
   if (!it) return ['not learnt yet, not in the plan'];
-  return [`${it.length_m.toFixed(1)} m in ${seconds(it.time_s)}, cost ${it.cost_s.toFixed(1)} s`,
+  return [`${it.length_m.toFixed(1)} m in ${seconds(it.time_s)}, cost ${it.cost_s === null ? 'infinite' : seconds(it.cost_s)}`,
     `succeeds ${it.successes} of ${it.episodes}`, `policy: ${it.policy}`, 'in the library, not in the plan'];
 }
 function driveLines(drive) {

@@ -22,7 +22,7 @@ pub(crate) struct Learn {
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
     /// The simulator in which policies are learnt; they are described at `run` [default: kinematic; with --learning paper
-    /// rapier2d].
+    /// and paper-tuned rapier2d].
     #[arg(long, value_name = "kinematic|rapier2d|rapier3d")]
     pub(crate) simulator: Option<String>,
     /// Where options are kept [default: a cache folder].

@@ -20,7 +20,8 @@ struct Entry {
     option: String,
     episodes: u32,
     successes: u32,
-    cost_s: f64,
+    /// `None` where it never succeeded.
+    cost_s: Option<f64>,
 }
 
 pub(crate) fn run(command: &Library, json: bool) -> Result<Exit, Failure> {
@@ -35,7 +36,8 @@ pub(crate) fn run(command: &Library, json: bool) -> Result<Exit, Failure> {
         say!("{} options, every file sound", options.len());
     } else {
         for Entry { world, option, episodes, successes, cost_s } in &options {
-            say!("{world}  {option:<14} holds {successes}/{episodes}, {cost_s:.1} s");
+            let cost = cost_s.map_or("no time".to_owned(), |cost_s| format!("{cost_s:.1} s"));
+            say!("{world}  {option:<14} holds {successes}/{episodes}, {cost}");
         }
     }
     Ok(Exit::Done)
@@ -59,7 +61,8 @@ fn entries(dir: &Path) -> Result<Vec<Entry>, Failure> {
             option: id.to_string(),
             episodes: stored.learnt.estimate.count.episodes,
             successes: stored.learnt.estimate.count.successes,
-            cost_s: stored.learnt.cost_s(sharp_drive::FAILURE_COST_S),
+            cost_s:
+                Some(stored.learnt.cost_s(sharp_drive::FAILURE_COST_S)).filter(|cost_s| cost_s.is_finite()),
         }));
     }
     Ok(entries)

@@ -220,17 +220,18 @@ fn print_report(report: &SolveReport) {
     }
     let ends: Vec<usize> =
         report.goals.iter().scan(0, |end, goal| Some(std::mem::replace(end, *end + goal.legs))).collect();
+    let in_tenths = |seconds: Option<f64>| seconds.map_or("-".to_owned(), |seconds| format!("{seconds:.1}"));
     for (index, option) in report.plan.iter().enumerate() {
         if let Some(number) = ends.iter().position(|&first| first == index) {
             let [x, y] = report.goals[number].goal;
             say!("to ({x}, {y}):");
         }
         say!(
-            "  {:<14} {:>5.1} m  time {:>5} s  cost {:>6.1} s  succeeds {:>4}/{:<4} on arrival  {}{}",
+            "  {:<14} {:>5.1} m  time {:>5} s  cost {:>6} s  succeeds {:>4}/{:<4} on arrival  {}{}",
             option.option,
             option.length_m,
-            option.time_s.map_or("-".to_owned(), |seconds| format!("{seconds:.1}")),
-            option.cost_s,
+            in_tenths(option.time_s),
+            in_tenths(option.cost_s),
             option.on_arrival.successes,
             option.on_arrival.episodes,
             option.policy,

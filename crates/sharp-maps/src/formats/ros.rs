@@ -80,6 +80,9 @@ impl GreyRules {
     }
 }
 
+/// The keys that a map's YAML may have.
+const KEYS: [&str; 7] = ["image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode"];
+
 /// Everything that the YAML says.
 #[derive(Clone, Debug)]
 struct RosDescription {
@@ -87,6 +90,8 @@ struct RosDescription {
     resolution_m: f64,
     origin: Pose,
     rules: GreyRules,
+    /// Keys that no map has; one of them may be `mode`, misspelt.
+    unread: Vec<String>,
 }
 
 /// Reads the map described by the YAML file at `path`.
@@ -130,6 +135,13 @@ fn read(
     let file = path.display().to_string();
     let bytes = files::read(path, FileKind::Text)?;
     let description = describe(&file, files::as_text(&file, &bytes)?)?;
+    if let Some(key) = description.unread.first() {
+        let others = description.unread.len() - 1;
+        let others = if others > 0 { format!(" and {others} others are") } else { " is".to_owned() };
+        let key: String = key.chars().take(60).collect();
+        warnings
+            .push(format!("{file}: unknown key {key:?}{others} ignored; a ROS map has {}", KEYS.join(", ")));
+    }
     let GreyRules { occupied_threshold, free_threshold, .. } = description.rules;
     if free_threshold > occupied_threshold {
         warnings.push(format!(
@@ -178,7 +190,8 @@ pub(crate) fn plain_grid(
         free_threshold: FREE_THRESHOLD,
     };
     let origin = Pose::new(0.0, 0.0, 0.0);
-    to_grid(file, picture, &RosDescription { image: String::new(), resolution_m, origin, rules })
+    let (image, unread) = (String::new(), Vec::new());
+    to_grid(file, picture, &RosDescription { image, resolution_m, origin, rules, unread })
 }
 
 fn to_grid(file: &str, picture: &GreyImage, description: &RosDescription) -> Result<OccupancyGrid, MapError> {
@@ -256,7 +269,9 @@ fn describe(file: &str, text: &str) -> Result<RosDescription, MapError> {
         occupied_threshold: fields.threshold("occupied_thresh")?,
         free_threshold: fields.threshold("free_thresh")?,
     };
-    Ok(RosDescription { image, resolution_m, origin: fields.origin()?, rules })
+    let keys = fields.entries.iter().map(|(key, _)| key);
+    let unread = keys.filter(|key| !KEYS.contains(&key.as_str())).cloned().collect();
+    Ok(RosDescription { image, resolution_m, origin: fields.origin()?, rules, unread })
 }
 
 /// The entries of the YAML and the file's name for messages.

@@ -100,10 +100,11 @@ impl LearntPolicy {
         Self::untrained(policy, SuccessEstimate { count, mean_time_s: f64::INFINITY })
     }
 
-    /// Whether it was seen to fail every time.
-    pub(crate) const fn never_succeeded(&self) -> bool {
+    /// How many trainings of the option came to nothing in a row, this one included: 0 if it has a success, or was not trained.
+    pub(crate) fn failed_trainings(&self) -> u32 {
         let SuccessCount { episodes, successes } = self.estimate.count;
-        episodes > 0 && successes == 0
+        let failed = self.training.as_ref().filter(|_| episodes > 0 && successes == 0);
+        failed.map_or(0, |training| training.failed_before + 1)
     }
 
     /// The cost that A* uses (line 17), seconds: mean time per success, and `failure_cost_s` for each failure.

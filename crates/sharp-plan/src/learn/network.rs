@@ -15,8 +15,8 @@ use super::{
     TrainingPoint,
 };
 
-/// A training is kept after every evaluation, and where evaluations are rare after so many steps: ten seconds of the paper's
-/// mode.
+/// A training is kept after every evaluation, and where evaluations are rare after so many steps: a few seconds of the
+/// paper's mode.
 const SAVE_EVERY: u64 = 2_000;
 
 /// How a network is trained.
@@ -88,7 +88,12 @@ pub(crate) fn train_network(
     let trial = task.monte_carlo(task.estimate_episodes, "certify", 0);
     let trial = trial.with_contact_ends(training.reward.contact_ends());
     let estimate = trial.estimate(&task.drivers(&policy)[..1], &task.states);
-    let record = Training { stop: trained.stop, mean_return: trained.evaluation.mean_return, points };
+    let record = Training {
+        stop: trained.stop,
+        mean_return: trained.evaluation.mean_return,
+        points,
+        failed_before: 0,
+    };
     Ok(LearntPolicy {
         env_steps: trained.env_steps,
         gradient_steps: trained.updates,

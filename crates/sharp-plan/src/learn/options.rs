@@ -200,7 +200,7 @@ fn take(
     search: &Search<'_>,
     policies: &mut Policies<'_>,
 ) -> Result<bool, FileError> {
-    let learnt = match result {
+    let mut learnt = match result {
         Ok(learnt) => learnt,
         Err(LearnFailure::Stopped) => {
             return file.and_then(TrainingFile::into_failure).map_or(Ok(false), Err);
@@ -209,6 +209,9 @@ fn take(
         Err(LearnFailure::File(error)) => return Err(error),
         Err(LearnFailure::Broken(_)) => LearntPolicy::useless(&problem.world.robot),
     };
+    if let Some(training) = &mut learnt.training {
+        training.failed_before = policies.failed_trainings(option.id);
+    }
     // The option of a plan may have been joined to its neighbours; the library keeps it as it is alone.
     policies.keep(search.option(option.id).unwrap_or(option), learnt, &problem.world.grid)?;
     if let Some(file) = file {
@@ -218,9 +221,9 @@ fn take(
     Ok(true)
 }
 
-/// The root of the random streams for learning `option`; another one after it was learnt in vain.
+/// The root of the random streams for learning `option`; another one after each training that failed.
 fn option_seed(problem: &PlanningProblem<'_>, option: &GuidedOption, policies: &Policies<'_>) -> Seed {
-    problem.seed.child(&format!("leg {}", option.id), policies.spent_in_vain(option.id))
+    problem.seed.child(&format!("leg {}", option.id), policies.failed_trainings(option.id).into())
 }
 
 /// The task of learning `option` from `states`, with nothing known of what comes after it.

@@ -27,6 +27,15 @@ pub struct Training {
     pub mean_return: f64,
     /// The evaluations on the way.
     pub points: Vec<TrainingPoint>,
+    /// Trainings of the same option in earlier problems, none of which led to a single success.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub failed_before: u32,
+}
+
+/// Serde asks with a reference.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks with a reference")]
+const fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 /// What one evaluation in the course of a training showed.
@@ -210,7 +219,8 @@ mod tests {
         let spec = EnvironmentSpec { observation_len: interface.observation_len(), action_len: 2 };
         let actor = Actor::new(spec, &[8], &mut Seed(1).stream("actor", 0));
         let policy = OptionPolicy::Network(NetworkPolicy::new(interface, actor.clone().into()));
-        let training = Training { stop: StopReason::Rule, mean_return: 812.0, points: vec![point] };
+        let training =
+            Training { stop: StopReason::Rule, mean_return: 812.0, points: vec![point], failed_before: 1 };
         let estimate = SuccessEstimate { count, mean_time_s: f64::INFINITY };
         let learnt = LearntPolicy {
             env_steps: 20_000,
