@@ -164,12 +164,15 @@ fn harmless_spellings_are_read() {
         ("a quoted number", SOUND_YAML.replace("0.5", "\"0.5\"")),
         ("an integer origin", SOUND_YAML.replace("[1.0, 2.0, 0.0]", "[1, 2, 0]")),
         ("a block list", SOUND_YAML.replace("[1.0, 2.0, 0.0]", "\n  - 1.0\n  - 2.0\n  - 0.0")),
-        ("other keys", format!("{SOUND_YAML}cost_translation_table: none\n")),
     ] {
         let map = load_yaml(yaml.as_bytes()).unwrap_or_else(|e| panic!("{label}: {e}"));
         assert_eq!(map.grid.frame().resolution_m, 0.5, "{label}");
         assert_eq!(map.warnings, Vec::<String>::new(), "{label}");
     }
+    let other = format!("{SOUND_YAML}cost_translation_table: none\nmodee: raw\n");
+    let map = load_yaml(other.as_bytes()).expect("other keys are no error");
+    let [warning] = &map.warnings[..] else { panic!("{:?}", map.warnings) };
+    assert!(warning.contains("\"cost_translation_table\" and 1 more are ignored"), "{warning}");
 }
 
 #[test]

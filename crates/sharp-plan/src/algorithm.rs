@@ -420,14 +420,15 @@ mod tests {
         };
         let tried: Vec<_> = (0..3).map(|_| asked()).collect();
         assert!(tried.iter().all(|(is_solved, _)| *is_solved), "the paper keeps whatever was learnt");
+        // Options are learnt side by side, in any order.
         let option = |(_, legs): &(bool, Vec<(LegId, Seed)>)| {
-            *legs.iter().find(|(id, _)| id.role() == Role::Option).expect("it is trained")
+            let options = legs.iter().filter(|(id, _)| id.role() == Role::Option);
+            *options.min_by_key(|(id, _)| *id).expect("one is trained")
         };
         let [first, second, third] = [0, 1, 2].map(|index| option(&tried[index]));
         assert_eq!((first.0, first.0), (second.0, third.0), "the same plan each time");
         assert!(first.1 != second.1 && second.1 != third.1 && first.1 != third.1, "other seeds");
-        let (is_solved, legs) = asked();
-        assert!(!is_solved, "there is no other way");
+        let (_, legs) = asked();
         assert!(legs.iter().all(|(id, _)| *id != first.0), "it counts as impossible now: {legs:?}");
     }
 

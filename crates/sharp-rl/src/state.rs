@@ -38,12 +38,12 @@ pub struct TrainState {
     /// Environment steps at the last evaluation; 0 before the first.
     pub(crate) evaluated_at: u64,
     /// The attempt under way.
-    pub(crate) attempt: Attempt,
+    pub(crate) attempt: TrainingAttempt,
 }
 
 /// What a run has done since it began, or began anew ([`RestartRule`](crate::RestartRule)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Attempt {
+pub(crate) struct TrainingAttempt {
     /// Environment steps of the run before it.
     pub(crate) began_at: u64,
     /// Gradient steps of the run before it.
@@ -102,7 +102,7 @@ impl TrainState {
             evaluation_rng: fork(),
             records: (0..count).map(|_| record(fork())).collect(),
             evaluated_at: 0,
-            attempt: Attempt::default(),
+            attempt: TrainingAttempt::default(),
         }
     }
 
@@ -111,7 +111,8 @@ impl TrainState {
         let spec = self.spec();
         self.sac = SacState::new(spec, settings, &mut Stream::from_rng(&mut self.action_rng));
         self.buffer = ReplayBuffer::new(spec, settings.buffer_capacity);
-        self.attempt = Attempt { began_at: self.env_steps, updates_before: self.updates, best_return: None };
+        self.attempt =
+            TrainingAttempt { began_at: self.env_steps, updates_before: self.updates, best_return: None };
     }
 
     /// The lengths of observations and actions.

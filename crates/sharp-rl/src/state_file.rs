@@ -8,7 +8,7 @@ use crate::buffer::ReplayBuffer;
 use crate::environment::{EnvironmentSpec, Stream};
 use crate::evaluation::Evaluation;
 use crate::sac_state::SacState;
-use crate::state::{Attempt, BestNetworks, ReplayRecord, TrainState};
+use crate::state::{BestNetworks, ReplayRecord, TrainState, TrainingAttempt};
 use crate::store::{StoreError, TensorReader, TensorWriter};
 
 /// A stream as text: seed and position in 32-bit words.
@@ -69,7 +69,7 @@ struct TrainHeader {
     evaluated_at: u64,
     /// Files from before runs could begin anew have none: theirs is the first.
     #[serde(default)]
-    attempt: Option<Attempt>,
+    attempt: Option<TrainingAttempt>,
     buffer_capacity: usize,
     buffer_len: usize,
     buffer_next: usize,
@@ -164,8 +164,8 @@ impl TrainState {
             None => None,
         };
         let best_return = header.best.as_ref().map(|best| best.1.mean_return);
-        let attempt = header.attempt.unwrap_or(Attempt { best_return, ..Attempt::default() });
-        let Attempt { began_at, updates_before, .. } = attempt;
+        let attempt = header.attempt.unwrap_or(TrainingAttempt { best_return, ..TrainingAttempt::default() });
+        let TrainingAttempt { began_at, updates_before, .. } = attempt;
         if began_at > header.env_steps || updates_before > header.updates {
             let what =
                 format!("an attempt from step {began_at} and update {updates_before}, which lie ahead");

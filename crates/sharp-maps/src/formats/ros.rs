@@ -137,7 +137,7 @@ fn read(
     let description = describe(&file, files::as_text(&file, &bytes)?)?;
     if let Some(key) = description.unread.first() {
         let others = description.unread.len() - 1;
-        let others = if others > 0 { format!(" and {others} others are") } else { " is".to_owned() };
+        let others = if others > 0 { format!(" and {others} more are") } else { " is".to_owned() };
         let key: String = key.chars().take(60).collect();
         warnings
             .push(format!("{file}: unknown key {key:?}{others} ignored; a ROS map has {}", KEYS.join(", ")));
