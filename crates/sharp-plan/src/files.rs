@@ -186,6 +186,12 @@ pub(crate) fn read_blob(folder: &Path, name: &str) -> Result<Vec<u8>, FileError>
     Ok(bytes)
 }
 
+/// Whether a count is left out of a file. Serde asks with a reference.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks with a reference")]
+pub(crate) const fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

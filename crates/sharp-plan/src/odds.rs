@@ -14,7 +14,7 @@ use sharp_guide::{Departure, GuidePath, GuidedOption, LegId, Role};
 use sharp_sim::RobotState;
 use sharp_space::Seed;
 
-use crate::files::FileError;
+use crate::files::{self, FileError};
 use crate::hand_over::{RUN_UP_M, RunBudget, Stretch};
 use crate::known::KnownOptions;
 use crate::learn::LearntPolicy;
@@ -73,14 +73,8 @@ pub struct PlanPiece {
     /// Mean time, seconds.
     pub time_s: f64,
     /// Runs that were made for this plan alone; 0 where a library knew.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "files::is_zero")]
     pub runs: u32,
-}
-
-/// Serde asks with a reference.
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks with a reference")]
-const fn is_none(runs: &u32) -> bool {
-    *runs == 0
 }
 
 impl ComposedOdds {

@@ -28,14 +28,8 @@ pub struct Training {
     /// The evaluations on the way.
     pub points: Vec<TrainingPoint>,
     /// Trainings of the same option in earlier problems, none of which led to a single success.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "files::is_zero")]
     pub failed_before: u32,
-}
-
-/// Serde asks with a reference.
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks with a reference")]
-const fn is_zero(count: &u32) -> bool {
-    *count == 0
 }
 
 /// What one evaluation in the course of a training showed.
