@@ -20,23 +20,16 @@ pub enum ServeLine {
     Cancel,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PoseText {
-    pose: [f64; 3],
-    /// Forward speed, metres per second; estimated from the poses where it is left out.
-    speed: Option<f64>,
-    /// Yaw rate, radians per second; estimated likewise.
-    yaw_rate: Option<f64>,
-}
-
+/// A key that is null counts as left out.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LineText {
     goal: Option<Vec<f64>>,
     route: Option<Vec<Vec<f64>>>,
     pose: Option<[f64; 3]>,
+    /// Forward speed, metres per second; estimated from the poses where it is left out.
     speed: Option<f64>,
+    /// Yaw rate, radians per second; estimated likewise.
     yaw_rate: Option<f64>,
     cancel: Option<bool>,
 }
@@ -46,8 +39,13 @@ struct LineText {
 /// # Errors
 /// Returns what is wrong with the line.
 pub fn parse_pose_line(text: &str) -> Result<Reading, String> {
-    let line: PoseText = serde_json::from_str(text).map_err(|error| error.to_string())?;
-    line.reading()
+    match parse_line(text)? {
+        LineText { goal: None, route: None, cancel: None, pose: Some(pose), speed, yaw_rate } => {
+            reading(pose, speed, yaw_rate)
+        }
+        LineText { goal: None, route: None, cancel: None, .. } => Err("pose is missing".to_owned()),
+        _ => Err("this service drives one plan: expected pose, and perhaps speed and yaw_rate".to_owned()),
+    }
 }
 
 /// Reads a line to a service that plans: one of goal, route, pose and cancel.
@@ -55,8 +53,7 @@ pub fn parse_pose_line(text: &str) -> Result<Reading, String> {
 /// # Errors
 /// Returns what is wrong with the line.
 pub fn parse_serve_line(text: &str) -> Result<ServeLine, String> {
-    let line: LineText = serde_json::from_str(text).map_err(|error| error.to_string())?;
-    let LineText { goal, route, pose, speed, yaw_rate, cancel } = line;
+    let LineText { goal, route, pose, speed, yaw_rate, cancel } = parse_line(text)?;
     match (goal, route, pose, cancel) {
         (Some(goal), None, None, None) => Ok(ServeLine::Drive(vec![place(&goal)?])),
         (None, Some(route), None, None) if route.len() > GOALS_MAX => {
@@ -68,21 +65,22 @@ pub fn parse_serve_line(text: &str) -> Result<ServeLine, String> {
         (None, Some(route), None, None) => {
             Ok(ServeLine::Drive(route.iter().map(|goal| place(goal)).collect::<Result<_, _>>()?))
         }
-        (None, None, Some(pose), None) => Ok(ServeLine::At(PoseText { pose, speed, yaw_rate }.reading()?)),
+        (None, None, Some(pose), None) => Ok(ServeLine::At(reading(pose, speed, yaw_rate)?)),
         (None, None, None, Some(true)) => Ok(ServeLine::Cancel),
         (None, None, None, Some(false)) => Err("cancel is false, expected true".to_owned()),
         _ => Err("expected one of goal, route, pose and cancel".to_owned()),
     }
 }
 
-impl PoseText {
-    fn reading(self) -> Result<Reading, String> {
-        let Self { pose, speed, yaw_rate } = self;
-        if !pose.iter().chain(&speed).chain(&yaw_rate).all(|number| is_sane(*number)) {
-            return Err("pose, speed and yaw_rate must be finite".to_owned());
-        }
-        Ok(Reading { pose: Pose::from(pose), speed_mps: speed, yaw_rate_radps: yaw_rate })
+fn parse_line(text: &str) -> Result<LineText, String> {
+    serde_json::from_str(text).map_err(|error| error.to_string())
+}
+
+fn reading(pose: [f64; 3], speed: Option<f64>, yaw_rate: Option<f64>) -> Result<Reading, String> {
+    if !pose.iter().chain(&speed).chain(&yaw_rate).all(|number| is_sane(*number)) {
+        return Err("pose, speed and yaw_rate must be finite".to_owned());
     }
+    Ok(Reading { pose: Pose::from(pose), speed_mps: speed, yaw_rate_radps: yaw_rate })
 }
 
 fn is_sane(number: f64) -> bool {
@@ -111,7 +109,13 @@ mod tests {
         let at = Reading { pose: Pose::new(1.0, 2.0, 0.5), speed_mps: Some(0.2), yaw_rate_radps: None };
         assert_eq!(parse_pose_line(r#"{"pose":[1,2,0.5],"speed":0.2}"#), Ok(at));
         assert_eq!(parse_serve_line(r#"{"pose":[1,2,0.5],"speed":0.2}"#), Ok(ServeLine::At(at)));
+        assert_eq!(parse_pose_line(r#"{"pose":[1,2,0.5],"speed":0.2,"route":null}"#), Ok(at));
         assert_eq!(parse_serve_line(r#"{"cancel":true}"#), Ok(ServeLine::Cancel));
+        for line in [r#"{"cancel":true}"#, r#"{"goal":[1,2]}"#] {
+            let error = parse_pose_line(line).expect_err(line);
+            assert!(error.contains("drives one plan"), "{line}: {error}");
+        }
+        assert_eq!(parse_pose_line(r#"{"speed":1}"#), Err("pose is missing".to_owned()));
         let goals = vec![Pose::new(1.0, 2.0, 0.0), Pose::new(3.0, 4.0, 1.5)];
         assert_eq!(parse_serve_line(r#"{"route":[[1,2],[3,4,1.5]]}"#), Ok(ServeLine::Drive(goals)));
         for (line, reason) in [
