@@ -26,6 +26,7 @@ mod tidy;
 mod train_prior;
 mod train_regions;
 mod tree;
+mod yardstick;
 
 use std::process::ExitCode;
 
@@ -54,7 +55,9 @@ usage: cargo xtask COMMAND
   bench peers [sim|learning|option|regions]
                          the same work here and in other programs, as JSON lines
                          [--rounds N] [--seconds S] [--map M] [--option-limit S]
-                         [--option-seeds N] [--peer-threads N] [--problem P]";
+                         [--option-seeds N] [--peer-threads N] [--problem P]
+  bench yardstick        what policies cost beside value iteration that knows slip and pull
+                         [--robot R] [--noise N] [--options N] [--episodes N] [--seed N] [--out DIR]";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -77,6 +80,7 @@ fn main() -> ExitCode {
         "baselines" => baselines::run(rest),
         "paper-table" => paper_table::run(rest),
         "bench" if rest.first().is_some_and(|word| word == "peers") => peers::run(&rest[1..]),
+        "bench" if rest.first().is_some_and(|word| word == "yardstick") => yardstick::run(&rest[1..]),
         "bench" => bench::run(rest),
         "help" | "-h" | "--help" => {
             println!("{USAGE}");

@@ -53,6 +53,7 @@ mod stopwatch;
 mod tensorboard;
 mod times;
 mod tour;
+mod yardstick;
 
 #[cfg(test)]
 mod tests;
@@ -96,3 +97,7 @@ pub use stopwatch::{Stopwatch, TimedMonitor, clock_us};
 pub use tensorboard::EventFile;
 pub use times::{DecisionTimes, Reuse, SolveTimes};
 pub use tour::{SolvedTour, solve_tour};
+pub use yardstick::{
+    InformedPolicy, PolicyCost, ValueSettings, ValueTable, YardstickLine, YardstickOption, yardstick_picture,
+    yardstick_table,
+};

@@ -18,9 +18,11 @@ use crate::policy::OptionPolicy;
 
 /// Degrees of caution that are compared when a prior is scored, the least first.
 const CAUTIONS: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// Prices of a failure at which no and full caution are right, seconds. The priors are trained with prices from 30 s to
-/// 2,000 s; in plans full caution is the cheapest from 1,000 s on (`docs/algorithms/prior.md`).
-const FAILURE_COSTS_S: [f64; 2] = [30.0, FAILURE_COST_S];
+/// Price of a failure at which no caution is right, seconds.
+const NO_CAUTION_S: f64 = 30.0;
+/// Price of a failure at which full caution is right for a robot that turns in place, and for a car, seconds: in plans a car with
+/// half caution costs as much as with full caution at 1,000 s a failure, and drives faster (`docs/algorithms/prior.md`).
+const FULL_CAUTION_S: [f64; 2] = [FAILURE_COST_S, 33.0 * FAILURE_COST_S];
 
 /// The note in a prior's file that says what its inputs mean, and the only value that is read.
 const FORMAT_NOTE: (&str, &str) = ("prior-format", "2");
@@ -87,13 +89,14 @@ impl Prior {
         CAUTIONS.into_iter().map(|caution| self.at(caution, robot, noise)).collect()
     }
 
-    /// How careful it is to be where a failure costs `failure_cost_s`, 0 to 1; in training each step of caution
-    /// multiplies the price by the same factor.
+    /// How careful the shipped prior of `robot` is to be where a failure costs `failure_cost_s`, 0 to 1; in training each step
+    /// of caution multiplies the price by the same factor.
     #[must_use]
-    pub fn caution(failure_cost_s: f64) -> f32 {
-        let [least_s, most_s] = FAILURE_COSTS_S;
-        let factor = failure_cost_s.max(least_s) / least_s;
-        (libm::log(factor) / libm::log(most_s / least_s)).min(1.0) as f32
+    pub fn caution(robot: &RobotModel, failure_cost_s: f64) -> f32 {
+        let [turning_s, steering_s] = FULL_CAUTION_S;
+        let most_s = if robot.can_turn_in_place() { turning_s } else { steering_s };
+        let factor = failure_cost_s.max(NO_CAUTION_S) / NO_CAUTION_S;
+        (libm::log(factor) / libm::log(most_s / NO_CAUTION_S)).min(1.0) as f32
     }
 
     /// Its policy for `robot` under `noise` at full caution.
@@ -154,9 +157,13 @@ mod tests {
 
     #[test]
     fn caution_follows_the_price_of_a_failure() {
-        let cautions = [0.0, 30.0, 173.0, 1000.0, 1e6].map(Prior::caution);
-        assert!((cautions[2] - 0.5).abs() < 0.01, "{cautions:?}");
-        assert_eq!([cautions[0], cautions[1], cautions[3], cautions[4]], [0.0, 0.0, 1.0, 1.0]);
+        for (robot, half_s, full_s) in
+            [(RobotModel::husky(), 173.0, 1000.0), (RobotModel::limo(), 995.0, 33_000.0)]
+        {
+            let cautions = [0.0, 30.0, half_s, full_s, 1e6].map(|cost_s| Prior::caution(&robot, cost_s));
+            assert!((cautions[2] - 0.5).abs() < 0.01, "{cautions:?}");
+            assert_eq!([cautions[0], cautions[1], cautions[3], cautions[4]], [0.0, 0.0, 1.0, 1.0]);
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! What a policy sees: the world, what the robot knows of itself, and where it is on its guide.
 
 use sharp_guide::GuidePath;
-use sharp_sim::{ActionSettings, NoiseModel, RobotState};
-use sharp_space::{Heading, Pose, Vector};
+use sharp_sim::{ActionSettings, EpisodeBias, NoiseModel, RobotState};
+use sharp_space::{Heading, Pose, Stream, Vector};
 
 use crate::command::Command;
 use crate::episode::Motion;
@@ -69,6 +69,12 @@ impl Observation {
     #[must_use]
     pub fn without_slip_estimate(self) -> Self {
         Self { slip: None, ..self }
+    }
+
+    /// A slip and a pull of this episode, drawn from what the robot believes of them; `None` without a slip estimate.
+    #[must_use]
+    pub fn draw_bias(&self, rng: &mut Stream) -> Option<EpisodeBias> {
+        self.slip.map(|slip| slip.draw(rng))
     }
 
     /// The observation after `motion`.

@@ -4,7 +4,9 @@
 //! turn of every action with the model's. A scalar filter compares the distance. The noise model gives the prior
 //! and the measurement noise, which is large: the waypoint of each action is perturbed as well.
 
-use sharp_sim::{NoiseModel, RobotState};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use sharp_sim::{EpisodeBias, NoiseModel, RobotState};
 use sharp_space::Pose;
 
 use crate::command::Command;
@@ -16,6 +18,8 @@ const MODEL_SD: f64 = 0.01;
 const SLOPE_MIN: f64 = 0.05;
 /// Largest correction of a bearing, radians.
 const FEED_FORWARD_MAX_RAD: f64 = 0.7;
+/// A robot that slips more would hardly move.
+const SLIP_DRAWN_MAX: f64 = 0.95;
 /// Square of the number of standard deviations beyond which a measurement is an outlier and is ignored.
 const OUTLIER: f64 = 25.0;
 
@@ -49,6 +53,21 @@ impl SlipEstimate {
     /// The best guess so far.
     pub(crate) const fn slip(&self) -> &SlipParameters {
         &self.slip
+    }
+
+    /// A slip and a pull that are as probable as the estimate says, as far as a robot can slip.
+    pub(crate) fn draw(&self, rng: &mut impl Rng) -> EpisodeBias {
+        let Self { slip, spread: [yy, yd, dd], speed_spread, .. } = self;
+        let mut normal = || <StandardNormal as Distribution<f64>>::sample(&StandardNormal, rng);
+        let (speed, first, second) = (normal(), normal(), normal());
+        let yaw_sd = yy.max(0.0).sqrt();
+        let along = if yaw_sd > 0.0 { yd / yaw_sd } else { 0.0 };
+        let slipping = |share: f64| (1.0 - share).clamp(0.0, SLIP_DRAWN_MAX);
+        EpisodeBias {
+            speed_slip: slipping(slip.speed_share + speed_spread.max(0.0).sqrt() * speed),
+            yaw_slip: slipping(slip.yaw_share + yaw_sd * first),
+            drift_radps: slip.drift_radps + along * first + (dd - along * along).max(0.0).sqrt() * second,
+        }
     }
 
     /// The estimate after `command` moved the robot from `before` to `after`. A motion that the noise does

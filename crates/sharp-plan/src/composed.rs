@@ -195,7 +195,7 @@ impl ComposedPolicy {
         }
         let measured = |id: LegId| known.get(&id).filter(|_| is_kept(&id)).map(|step| step.learnt.estimate);
         let (_, options) = search.plan(&measured, &())?;
-        let caution = Prior::caution(plan.method.failure_cost_s);
+        let caution = Prior::caution(&plan.world.robot, plan.method.failure_cost_s);
         let prior = || plan.world.prior().at(caution, &plan.world.robot, &plan.noise);
         let policy = |option: &Arc<GuidedOption>| {
             known.get(&option.id).map_or_else(prior, |step| step.learnt.policy.clone())

@@ -58,7 +58,8 @@ impl<'a> Pricer<'a> {
 
     /// The policies at hand for a leg: the prior, whose drives the model prices, and the follower that stands in for it.
     pub(crate) fn policies(&self) -> [OptionPolicy; 2] {
-        let (robot, caution) = (&self.world.robot, Prior::caution(self.failure_cost_s));
+        let robot = &self.world.robot;
+        let caution = Prior::caution(robot, self.failure_cost_s);
         let follower = ProfiledFollower::tuned(robot, &self.noise);
         [self.world.prior().at(caution, robot, &self.noise), OptionPolicy::Profiled(follower)]
     }
@@ -96,7 +97,7 @@ impl<'a> Pricer<'a> {
     fn of_model(&self, id: LegId, guide: GuideView<'_>) -> Price {
         let ends = guide_ends(id);
         let model = CostModel::shipped(&self.world.robot);
-        let caution = Prior::caution(self.failure_cost_s);
+        let caution = Prior::caution(&self.world.robot, self.failure_cost_s);
         let cost = model.predict(self.world, (&guide, ends), &self.noise, caution);
         Price { time_s: cost.time_s, success: cost.success() }
     }

@@ -52,6 +52,17 @@ impl TrainingRoute {
         self.options.is_empty()
     }
 
+    /// Map and robot.
+    #[must_use]
+    pub const fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Its options in order, each with where it may begin.
+    pub fn options(&self) -> impl Iterator<Item = (&Arc<GuidedOption>, &InitialStates)> {
+        self.options.iter().zip(&self.states)
+    }
+
     /// How often `policy` succeeds on each option under `noise`.
     #[must_use]
     pub fn estimate(

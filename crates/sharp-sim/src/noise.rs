@@ -232,6 +232,14 @@ impl EpisodeNoise {
         Self { model: model.clone(), key, speed_slip, yaw_slip, drift_radps }
     }
 
+    /// The same noise of actions with another slip and pull: those of a robot on a floor that is known.
+    #[must_use]
+    pub const fn with_bias(mut self, bias: EpisodeBias) -> Self {
+        let EpisodeBias { speed_slip, yaw_slip, drift_radps } = bias;
+        (self.speed_slip, self.yaw_slip, self.drift_radps) = (speed_slip, yaw_slip, drift_radps);
+        self
+    }
+
     /// Slip and pull of the episode.
     #[must_use]
     pub const fn bias(&self) -> EpisodeBias {
@@ -354,6 +362,15 @@ mod tests {
         let other = EpisodeNoise::new(&NoiseModel::harsh(), Seed(4), 8);
         assert_ne!(noise.action(0), other.action(0), "another episode");
         assert_ne!(forwards[0], forwards[1], "another action");
+    }
+
+    #[test]
+    fn slip_and_pull_can_be_given() {
+        let drawn = EpisodeNoise::new(&NoiseModel::nominal(), Seed(4), 7);
+        let given = EpisodeBias { speed_slip: 0.1, yaw_slip: 0.2, drift_radps: -0.3 };
+        let noise = drawn.clone().with_bias(given);
+        assert_eq!((noise.bias(), noise.action(3)), (given, drawn.action(3)), "actions keep their noise");
+        assert_eq!(noise.with_bias(drawn.bias()).bias(), drawn.bias());
     }
 
     #[test]

@@ -133,6 +133,12 @@ impl<S: Simulator> Vehicle<S> {
         self.delayed.extend(std::iter::repeat_n(current, periods));
     }
 
+    /// The same with this slip and pull in place of those that are drawn for the episode.
+    pub fn reset_with_bias(&mut self, state: RobotState, seed: Seed, episode: u64, bias: EpisodeBias) {
+        self.reset(state, seed, episode);
+        self.noise = self.noise.clone().with_bias(bias);
+    }
+
     /// Drives towards `waypoint` for one action, as fast as its distance asks for.
     pub fn act(&mut self, waypoint: Point) -> ActionReport {
         self.act_at(waypoint, self.robot.max_speed_mps)

@@ -182,7 +182,7 @@ impl Selection {
 /// The prior at the caution that fits the price of a failure.
 fn prior(task: &LearningTask<'_>) -> OptionPolicy {
     let (robot, noise) = (&task.world.robot, &task.conditions.noise);
-    task.world.prior().at(Prior::caution(task.failure_cost_s), robot, noise)
+    task.world.prior().at(Prior::caution(robot, task.failure_cost_s), robot, noise)
 }
 
 /// Successive halving (Jamieson and Talwalkar 2016): each round compares fewer candidates on more episodes.
