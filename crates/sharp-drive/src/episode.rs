@@ -10,7 +10,7 @@
 
 use std::fmt;
 
-use sharp_sim::{ActionReport, RobotState};
+use sharp_sim::{ActionReport, EpisodeBias, RobotState};
 use sharp_space::{Pose, Seed};
 
 use crate::command::Command;
@@ -215,6 +215,12 @@ impl Episode {
         if self.rules.keep_trace {
             self.record.trace.push(state.pose);
         }
+    }
+
+    /// The same with this slip and pull in place of those that are drawn for the episode.
+    pub fn begin_with_bias(&mut self, state: RobotState, (seed, number): (Seed, u64), bias: EpisodeBias) {
+        self.begin(state, seed, number);
+        self.vehicle.set_bias(bias);
     }
 
     /// The state of the robot.

@@ -133,9 +133,8 @@ impl<S: Simulator> Vehicle<S> {
         self.delayed.extend(std::iter::repeat_n(current, periods));
     }
 
-    /// The same with this slip and pull in place of those that are drawn for the episode.
-    pub fn reset_with_bias(&mut self, state: RobotState, seed: Seed, episode: u64, bias: EpisodeBias) {
-        self.reset(state, seed, episode);
+    /// Sets slip and pull of the episode that runs, in place of those that were drawn for it.
+    pub fn set_bias(&mut self, bias: EpisodeBias) {
         self.noise = self.noise.clone().with_bias(bias);
     }
 

@@ -38,7 +38,7 @@ pub(super) enum Fit {
 
 /// A position near the guide.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
+pub(super) struct GridPlace {
     pub(super) position: Point,
     /// Way to the end of the guide from the nearest point of it, metres.
     pub(super) remaining_m: f64,
@@ -58,7 +58,7 @@ pub(super) struct PoseGrid {
     /// The place of each cell.
     index: Vec<u32>,
     /// In the order of the way that is left.
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<GridPlace>,
     /// For each place and heading whether the robot may stand so; poses that look away from the guide are left out.
     is_state: Vec<bool>,
     /// How the robot fits at the poses of a finer grid, for poses on the way.
@@ -68,7 +68,7 @@ pub(super) struct PoseGrid {
 /// The corners of the grid around a pose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PoseCorners {
-    /// Place, heading and weight of each.
+    /// Number of the place, number of the heading and weight of each.
     pub(super) corners: [(u32, u32, f32); 8],
     /// Whether the pose may lie in the termination set.
     pub(super) is_near_end: bool,
@@ -81,12 +81,13 @@ impl PoseGrid {
         let cell_m = (CELL_WIDTHS * 2.0 * footprint.half_width_m()).max(CELL_MIN_M);
         let beside_m = footprint.circumscribed_radius_m() + BESIDE_M;
         let poses = option.guide.poses();
-        let least = |of: fn(&Pose) -> f64| poses.iter().map(of).fold(f64::INFINITY, f64::min) - beside_m;
-        let most = |of: fn(&Pose) -> f64| poses.iter().map(of).fold(f64::NEG_INFINITY, f64::max) + beside_m;
-        let (x, y): (fn(&Pose) -> f64, fn(&Pose) -> f64) = (|pose| pose.position.x, |pose| pose.position.y);
-        let origin = Point::new(least(x), least(y));
+        let least = |of: &dyn Fn(&Pose) -> f64| poses.iter().map(of).fold(f64::INFINITY, f64::min) - beside_m;
+        let most =
+            |of: &dyn Fn(&Pose) -> f64| poses.iter().map(of).fold(f64::NEG_INFINITY, f64::max) + beside_m;
+        let (x, y) = (|pose: &Pose| pose.position.x, |pose: &Pose| pose.position.y);
+        let origin = Point::new(least(&x), least(&y));
         let count = |low: f64, high: f64| ((high - low) / cell_m).ceil() as usize + 1;
-        let (columns, rows) = (count(origin.x, most(x)), count(origin.y, most(y)));
+        let (columns, rows) = (count(origin.x, most(&x)), count(origin.y, most(&y)));
         let mut grid = Self {
             origin,
             cell_m,
@@ -114,7 +115,7 @@ impl PoseGrid {
             let is_end = |(i, j): (f64, f64)| {
                 option.is_done(&Pose::new(position.x + i, position.y + j, guide_heading))
             };
-            grid.places.push(Place {
+            grid.places.push(GridPlace {
                 position,
                 remaining_m,
                 is_near_end: around.into_iter().any(is_end),

@@ -1,13 +1,9 @@
 //! What each action may do to a robot in free space, by its speed and turn: motions in the robot's own frame.
 
 use std::f64::consts::TAU;
-use std::sync::{Arc, Mutex, PoisonError};
 
-use sharp_drive::Command;
-use sharp_sim::{
-    ActionSettings, Drive, EpisodeBias, KinematicSim, NoiseModel, ObstacleMap, RobotModel, RobotState,
-    Simulator, StepInfo, Vehicle, WheelCommand,
-};
+use sharp_drive::{Command, Episode, EpisodeRules, World};
+use sharp_sim::{Drive, EpisodeBias, NoiseModel, RobotModel, RobotState, SimulatorKind};
 use sharp_space::{OccupancyGrid, Pose, Seed, Vector, trig};
 
 /// Shares of the top speed that a robot may have.
@@ -158,30 +154,26 @@ pub(super) struct MotionTable {
 impl MotionTable {
     /// Motions of `robot` with this slip and pull under `noise`; each action of each gait has `draws` of its own.
     pub(super) fn new(
-        robot: &Arc<RobotModel>,
+        robot: &RobotModel,
         noise: &NoiseModel,
         bias: EpisodeBias,
         draws: usize,
         seed: Seed,
     ) -> Self {
         let (actions, scale) = (ActionSet::of(robot), GaitScale::of(robot));
+        let world = free_space(robot);
         let origin = Pose::new(0.5 * FREE_M, 0.5 * FREE_M, 0.0);
-        let trace = Arc::new(Mutex::new(Vec::new()));
-        let sim = Traced { sim: KinematicSim::new(free_space(robot), robot), trace: Arc::clone(&trace) };
-        let mut vehicle = Vehicle::new(sim, Arc::clone(robot), noise.clone(), ActionSettings::default());
+        let simulator = world.simulator(SimulatorKind::Kinematic);
+        let mut episode = Episode::new(world.vehicle(&*simulator, noise, true), EpisodeRules::default());
         let mut motions = Vec::with_capacity(GAITS * actions.commands.len() * draws);
         for index in 0..GAITS {
             let state = scale.state(robot, origin, index);
-            for command in &actions.commands {
+            for &command in &actions.commands {
                 for _ in 0..draws {
                     // The number of the motion is the number of its noise.
-                    vehicle.reset_with_bias(state, seed, motions.len() as u64, bias);
-                    trace.lock().unwrap_or_else(PoisonError::into_inner).clear();
-                    let report = vehicle.act_at(command.to_world(&origin), command.speed_mps);
-                    let poses = trace.lock().unwrap_or_else(PoisonError::into_inner).clone();
-                    let via =
-                        std::array::from_fn(|i| relative(&origin, &poses[poses.len() * (i + 1) / VIA - 1]));
-                    motions.push(ActionMotion { via, gait: scale.gait(&report.after) });
+                    episode.begin_with_bias(state, (seed, motions.len() as u64), bias);
+                    let after = episode.act(command).after;
+                    motions.push(ActionMotion { via: arc(&origin, &after.pose), gait: scale.gait(&after) });
                 }
             }
         }
@@ -196,40 +188,29 @@ impl MotionTable {
     }
 }
 
-fn relative(origin: &Pose, pose: &Pose) -> [f32; 3] {
-    let local = origin.to_local(pose.position);
-    [local.x as f32, local.y as f32, origin.heading.turn_to(pose.heading) as f32]
+/// Poses on the circle from `from` to `to`, in the frame of `from`: nearly how a robot drives an action.
+fn arc(from: &Pose, to: &Pose) -> [[f32; 3]; VIA] {
+    let chord = from.to_local(to.position);
+    let (turn, way, direction) =
+        (from.heading.turn_to(to.heading), chord.norm(), trig::atan2(chord.y, chord.x));
+    std::array::from_fn(|i| {
+        let share = (i + 1) as f64 / VIA as f64;
+        let way = if turn.abs() < 1e-6 {
+            share * way
+        } else {
+            way * trig::sin_cos(0.5 * share * turn).0 / trig::sin_cos(0.5 * turn).0
+        };
+        let (sin, cos) = trig::sin_cos(direction - 0.5 * (1.0 - share) * turn);
+        [(way * cos) as f32, (way * sin) as f32, (share * turn) as f32]
+    })
 }
 
 /// A map without obstacles.
-fn free_space(robot: &RobotModel) -> Arc<ObstacleMap> {
+fn free_space(robot: &RobotModel) -> World {
     const CELLS: usize = 20;
     let rows = [".".repeat(CELLS).as_str(); CELLS].join("\n");
     let grid = OccupancyGrid::from_ascii(FREE_M / CELLS as f64, &rows).expect("equal rows of free cells");
-    Arc::new(ObstacleMap::new(&grid, robot.footprint))
-}
-
-/// A simulator that notes every pose.
-#[derive(Clone, Debug)]
-struct Traced {
-    sim: KinematicSim,
-    trace: Arc<Mutex<Vec<Pose>>>,
-}
-
-impl Simulator for Traced {
-    fn reset(&mut self, state: RobotState) {
-        self.sim.reset(state);
-    }
-
-    fn step(&mut self, command: WheelCommand, dt_s: f64) -> StepInfo {
-        let info = self.sim.step(command, dt_s);
-        self.trace.lock().unwrap_or_else(PoisonError::into_inner).push(self.sim.state().pose);
-        info
-    }
-
-    fn state(&self) -> &RobotState {
-        self.sim.state()
-    }
+    World::new(grid, robot.clone())
 }
 
 /// `angle` as a number of intervals of a circle that is cut into `count`.
@@ -263,8 +244,18 @@ mod tests {
     }
 
     #[test]
+    fn a_quarter_of_a_circle_is_a_circle() {
+        let via = arc(&Pose::new(1.0, 2.0, 0.0), &Pose::new(2.0, 3.0, 0.5 * std::f64::consts::PI));
+        for (i, [x, y, turn]) in via.into_iter().enumerate() {
+            let expected = (i + 1) as f32 / VIA as f32 * 0.5 * std::f32::consts::PI;
+            let off = (x - expected.sin()).hypot(y - (1.0 - expected.cos()));
+            assert!(off < 1e-5 && (turn - expected).abs() < 1e-5, "{i}: {x} {y} {turn}");
+        }
+    }
+
+    #[test]
     fn without_noise_an_action_ahead_leads_ahead() {
-        for robot in [RobotModel::husky(), RobotModel::limo()].map(Arc::new) {
+        for robot in [RobotModel::husky(), RobotModel::limo()] {
             let bias = EpisodeBias::default();
             let table = MotionTable::new(&robot, &NoiseModel::none(), bias, 1, Seed(1));
             let ahead = BEARINGS.len() * (COMMANDED.len() - 1) + BEARINGS.len() / 2;

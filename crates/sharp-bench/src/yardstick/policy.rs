@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sharp_drive::{AnyVehicle, Command, FAILURE_COST_S, Policy, Situation, World};
+use sharp_drive::{Command, Episode, EpisodeRules, FAILURE_COST_S, Policy, Situation, World};
 use sharp_guide::GuidedOption;
 use sharp_sim::{ActionSettings, EpisodeBias, NoiseModel, RobotState, SimulatorKind};
 use sharp_space::Seed;
@@ -41,7 +41,7 @@ enum Knowledge {
 pub struct InformedPolicy {
     values: Arc<Values>,
     /// Where actions are tried.
-    vehicle: AnyVehicle,
+    episode: Episode,
     knowledge: Knowledge,
     seed: Seed,
     decisions: u64,
@@ -69,7 +69,7 @@ impl InformedPolicy {
         let simulator = world.simulator(SimulatorKind::Kinematic);
         Self {
             values: Arc::new(values),
-            vehicle: world.vehicle(&*simulator, noise, true),
+            episode: Episode::new(world.vehicle(&*simulator, noise, true), EpisodeRules::default()),
             knowledge: Knowledge::Estimated,
             seed,
             decisions: 0,
@@ -97,17 +97,16 @@ impl InformedPolicy {
     /// The expected cost of `command` from `state`, where `biases` are as probable as each other, seconds.
     fn cost_s(&mut self, state: RobotState, command: Command, biases: &[EpisodeBias]) -> f64 {
         let action_s = ActionSettings::default().action_s;
-        let waypoint = command.to_world(&state.pose);
         let mut total = 0.0;
         for (draw, &bias) in biases.iter().enumerate() {
-            self.vehicle.reset_with_bias(state, self.seed, self.decisions * DRAWS + draw as u64, bias);
-            let report = self.vehicle.act_at(waypoint, command.speed_mps);
-            let is_close = self.values.tables[0].1.is_close(&report.after.pose);
+            self.episode.begin_with_bias(state, (self.seed, self.decisions * DRAWS + draw as u64), bias);
+            let motion = self.episode.act(command);
+            let is_close = self.values.tables[0].1.is_close(&motion.after.pose);
             let risk_s = if is_close { f64::from(CLOSE_COST_S) } else { 0.0 };
-            total += if report.contact {
+            total += if motion.contact {
                 FAILURE_COST_S
             } else {
-                action_s + risk_s + self.values.cost_s(&report.after, bias)
+                action_s + risk_s + self.values.cost_s(&motion.after, bias)
             };
         }
         total / biases.len() as f64

@@ -59,7 +59,7 @@ impl ValueTable {
     ) -> Self {
         let motions = MotionTable::new(&world.robot, noise, bias, settings.draws, seed);
         let grid = PoseGrid::new(world, option, motions.reach_m);
-        let first = |place: &super::grid::Place| {
+        let first = |place: &super::grid::GridPlace| {
             [(place.remaining_m / (FIRST_SPEED * world.robot.max_speed_mps)) as f32; HEADINGS * GAITS]
         };
         let values = grid.places.iter().flat_map(first).collect();
