@@ -62,7 +62,7 @@ pub(super) const POLICIES: [&str; 6] = ["informed", "estimating", "prior", "foll
 
 const STYLES: [(&str, Color, Marker); 6] = [
     ("told slip and pull", Color::hex(0x1a1a1a), Marker::Star),
-    ("estimates them", Color::hex(0x707070), Marker::Star),
+    ("estimates slip and pull", Color::hex(0x707070), Marker::Star),
     ("prior", Color::hex(0x0072b2), Marker::Circle),
     ("best of four followers", Color::hex(0xd55e00), Marker::Diamond),
     ("MPPI", Color::hex(0xe69f00), Marker::Down),
@@ -134,7 +134,7 @@ fn mean(lines: &[YardstickLine], of: impl Fn(&YardstickLine) -> Option<f64>) -> 
 /// the informed one's.
 #[must_use]
 pub fn yardstick_picture(lines: &[YardstickLine]) -> (String, u32) {
-    const TITLE: &str = "Cost of driving an option, beside the least that is possible";
+    const TITLE: &str = "Cost of driving an option, beside value iteration";
     let items: Vec<_> =
         STYLES[1..].iter().map(|&(label, color, marker)| LegendItem { label, color, marker }).collect();
     let panels: Vec<Panel> = lines.chunk_by(|a, b| a.robot == b.robot).map(panel).collect();
@@ -152,7 +152,7 @@ fn panel(lines: &[YardstickLine]) -> Panel {
     let noise = lines.first().map_or("", |line| line.noise.as_str());
     let robot = lines.first().map_or("", |line| line.robot.as_str());
     let mut panel = Panel::new(format!("{robot}, {noise} noise"), bottom + Axis::FOOT);
-    let axis = Axis::new([0.8, RATIO_MAX]).label("cost / cost for who knows slip and pull");
+    let axis = Axis::new([0.5, RATIO_MAX]).label("cost / cost for who knows slip and pull");
     axis.draw(&mut panel.chart, [Panel::TOP, bottom], plain);
     let note = TextStyle::new(Panel::TEXT).color(Color::SOFT).end();
     panel.chart.text([Panel::LEFT - 4.0, Panel::TOP + 8.0], note, "m");
