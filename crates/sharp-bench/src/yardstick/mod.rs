@@ -71,9 +71,7 @@ impl YardstickOption<'_> {
         let ends: Vec<(bool, f64)> = (0..episodes).into_par_iter().map(drive).collect();
         SuccessEstimate::of(ends.into_iter())
     }
-}
 
-impl YardstickOption<'_> {
     /// Drives so many episodes with every policy that is compared.
     #[must_use]
     pub fn compare(&self, (episodes, seed): (u32, Seed)) -> (f64, BTreeMap<String, PolicyCost>) {
