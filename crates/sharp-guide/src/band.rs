@@ -11,6 +11,8 @@ use crate::traversable::TraversableMask;
 pub(crate) const COARSE_M: f64 = 0.4;
 /// Rounds on each level; every level halves the spacing.
 const ROUNDS: [usize; 3] = [200, 60, 30];
+/// A point that moved by less than this, metres, rests until a neighbour moves further.
+const REST_M: f64 = 0.000_3;
 /// Each move goes this much beyond its balance: over-relaxation, which settles several times sooner.
 const OVER_RELAXATION: f64 = 1.6;
 
@@ -54,8 +56,11 @@ pub(crate) fn smooth(
         }
         let force = Force::new(settings, spacing, resolution);
         let tethers = tethers(&points, settings.discs);
+        let mut rests = vec![false; points.len()];
         for _ in 0..rounds {
-            relax(mask, &mut points, fixed, &force);
+            if relax(mask, &mut points, &mut rests, fixed, &force) {
+                break;
+            }
             for &(index, (center, radius)) in &tethers {
                 let off = points[index] - center;
                 points[index] = center + off.cap_magnitude(radius);
@@ -73,12 +78,13 @@ fn tethers(points: &[Vector], discs: &[(Vector, f64)]) -> Vec<(usize, (Vector, f
     discs.iter().filter_map(|&disc| nearest(disc.0).map(|index| (index, disc))).collect()
 }
 
-/// The weights of one level; spacing in cells.
+/// The weights of one level; lengths in cells.
 struct Force {
     bending: f64,
     pull: f64,
-    resolution_m: f64,
-    inertia: f64,
+    per_resolution: f64,
+    per_inertia: f64,
+    rest: f64,
 }
 
 impl Force {
@@ -88,14 +94,31 @@ impl Force {
         let spacing_m = spacing * resolution_m;
         let bending = (settings.stiffness_m / spacing_m).powi(2);
         let pull = settings.pull_per_m2 * spacing_m * spacing_m;
-        Self { bending, pull, resolution_m, inertia: 2.0 + 6.0 * bending + pull }
+        Self {
+            bending,
+            pull,
+            per_resolution: resolution_m.recip(),
+            per_inertia: (2.0 + 6.0 * bending + pull).recip(),
+            rest: REST_M / resolution_m,
+        }
     }
 }
 
-/// One round over the free points, in place.
-fn relax(mask: &TraversableMask<'_>, points: &mut [Vector], fixed: [usize; 2], force: &Force) {
+/// One round over the free points that do not rest, in place. Returns true if all of them rest.
+fn relax(
+    mask: &TraversableMask<'_>,
+    points: &mut [Vector],
+    rests: &mut [bool],
+    fixed: [usize; 2],
+    force: &Force,
+) -> bool {
     let last = points.len() - 1;
+    let mut all_rest = true;
     for i in fixed[0]..=last - fixed[1] {
+        if rests[i] {
+            continue;
+        }
+        all_rest = false;
         let (before, here, after) = (points[i - 1], points[i], points[i + 1]);
         let tension = before - here * 2.0 + after;
         // Beyond a free end the band goes on straight.
@@ -104,14 +127,27 @@ fn relax(mask: &TraversableMask<'_>, points: &mut [Vector], fixed: [usize; 2], f
         let right = if i + 2 <= last { second(here, after, points[i + 2]) } else { Vector::zeros() };
         let bending = tension * 2.0 - left - right;
         let (clearance_m, gradient) = mask.clearance_and_gradient(here);
-        let lack = (mask.comfort_m - clearance_m).max(0.0) / force.resolution_m;
-        let step = (tension + bending * force.bending + gradient * (lack * force.pull)) / force.inertia;
+        let lack = (mask.comfort_m - clearance_m).max(0.0) * force.per_resolution;
+        let step = (tension + bending * force.bending + gradient * (lack * force.pull)) * force.per_inertia;
         let moved = here + step * OVER_RELAXATION;
         // A point that lies in a closed cell must be able to leave it.
-        if mask.is_open_at(moved) || !mask.is_open_at(here) {
+        let may_move = is_same_cell(here, moved) || mask.is_open_at(moved) || !mask.is_open_at(here);
+        if may_move {
             points[i] = moved;
         }
+        if may_move && (moved - here).norm_squared() >= force.rest * force.rest {
+            rests[i.saturating_sub(2)..=(i + 2).min(last)].fill(false);
+        } else {
+            rests[i] = true;
+        }
     }
+    all_rest
+}
+
+/// Whether both points lie in one cell; most moves are short, and looking a cell up takes long.
+fn is_same_cell(a: Vector, b: Vector) -> bool {
+    let is_inside = b.x >= 0.0 && b.y >= 0.0;
+    is_inside && a.x as i64 == b.x as i64 && a.y as i64 == b.y as i64
 }
 
 /// Puts the fixed points of either end back onto a straight, off which a new point may lie.

@@ -15,12 +15,12 @@ use sharp_options::Endpoint;
 use sharp_rbvd::StateId;
 use sharp_space::{Cell, Heading, Point, Pose};
 
-use crate::context::{Attempt, GuideContext, tight_bends, touches};
+use crate::context::{GuideContext, tight_bends, touches};
 use crate::gap::narrowest_gap_m;
 use crate::guided_option::GuidedOption;
 use crate::inflate::GuideRobot;
 use crate::path::GuidePath;
-use crate::plan::attempts;
+use crate::plan::{ATTEMPTS, Drafts, attempts};
 use crate::request::{GuideEnd, GuideRequest};
 use crate::settings::GuideSettings;
 
@@ -120,13 +120,10 @@ impl<'a> LegChain<'a> {
         if run.len() < 2 {
             return;
         }
-        let attempts = self.attempts();
         // A cramped end takes the margin from the options around it alone.
         let mut robots = self.robot.inflated_at(None);
-        let Some(draft) = robots.next().and_then(|widest| self.draft(&run, ends, &widest, &attempts[0]))
-        else {
-            return;
-        };
+        let smoothed = |widest| self.draft(&run, ends, &widest, 0, &mut Drafts::default());
+        let Some(draft) = robots.next().and_then(smoothed) else { return };
         let mut alone = Vec::new();
         let mut pieces = draft.pieces.clone();
         for legs in draft.around_faults() {
@@ -178,16 +175,13 @@ impl<'a> LegChain<'a> {
             let turn_rad = ends.start.heading.turn_to(path.start().heading).abs();
             part.start == run.start || turn_rad <= JOINT_TURN_MAX_RAD
         };
-        let attempts = self.attempts();
-        let sound = |robot: &GuideRobot<'_>| {
-            let mut drafts = attempts.iter().filter_map(|attempt| self.draft(part, ends, robot, attempt));
-            drafts.find(|draft| draft.faults_m.is_empty() && is_straight(&draft.path))
+        let mut drafts = Drafts::default();
+        let mut sound = |robot: &GuideRobot<'a>| {
+            let mut paths = (0..ATTEMPTS).filter_map(|number| self.draft(part, ends, robot, number, &mut drafts));
+            paths.find(|draft| draft.faults_m.is_empty() && is_straight(&draft.path))
         };
-        robots.iter().filter(|robot| fits(robot, gap_m)).find_map(sound).map(|draft| draft.pieces)
-    }
-
-    fn attempts(&self) -> [Attempt; 4] {
-        attempts(self.settings, self.robot.geometry.clearance().frame().resolution_m)
+        let mut fitting = robots.iter().filter(|robot| fits(robot, gap_m));
+        fitting.find_map(|robot| sound(robot)).map(|draft| draft.pieces)
     }
 
     /// The guides of the options of `run` behind one another, from one end to the other.
@@ -199,13 +193,15 @@ impl<'a> LegChain<'a> {
         way
     }
 
-    /// One path for the options of `run`; `None` if it has no room for all of them.
+    /// One path for the options of `run`, smoothed by the attempt of this number; `None` if it has no room for all of them.
+    /// `drafts` belong to this run and its ends.
     fn draft(
         &self,
         run: &Range<usize>,
         ends: RunEnds,
-        robot: &GuideRobot<'_>,
-        attempt: &Attempt,
+        robot: &GuideRobot<'a>,
+        attempt: usize,
+        drafts: &mut Drafts<'a>,
     ) -> Option<JoinedPath> {
         let options = &self.options[run.clone()];
         let RunEnds { start, goal } = ends;
@@ -215,12 +211,16 @@ impl<'a> LegChain<'a> {
         let context = GuideContext::new(&request, robot, self.settings);
         context.has_length().ok()?;
         let frame = robot.geometry.clearance().frame();
-        let points: Vec<_> = self.way(run, ends).into_iter().map(|point| frame.to_grid(point)).collect();
-        let disc = |option: &Arc<GuidedOption>| {
-            option.target.endpoint().map(|set| (set.center, DISC_FACTOR * set.radius_m))
+        let smooth = || {
+            let points: Vec<_> = self.way(run, ends).into_iter().map(|point| frame.to_grid(point)).collect();
+            let disc = |option: &Arc<GuidedOption>| {
+                option.target.endpoint().map(|set| (set.center, DISC_FACTOR * set.radius_m))
+            };
+            let discs: Vec<(Point, f64)> = options[..options.len() - 1].iter().filter_map(disc).collect();
+            let attempts = attempts(self.settings, frame.resolution_m);
+            Ok(context.draft((&points, &discs), &attempts[attempt]))
         };
-        let discs: Vec<(Point, f64)> = options[..options.len() - 1].iter().filter_map(disc).collect();
-        let path = context.through(&context.draft((&points, &discs), attempt)).ok()?;
+        let path = context.through(drafts.of(robot.geometry, attempt, smooth).ok()?).ok()?;
         let (path, cannot_begin) = match context.lead_in(path.clone()) {
             Ok(led) => (led, None),
             Err(_) => (path, Some(0.0)),

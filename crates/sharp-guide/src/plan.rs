@@ -47,6 +47,9 @@ pub(crate) fn or_sampled(
     if searched.is_ok() || !may_sample { searched } else { sample_guide(request, robot, settings, rng) }
 }
 
+/// How many ways of smoothing are tried in turn.
+pub(crate) const ATTEMPTS: usize = 4;
+
 /// Smoothed ways of one request, by outline and attempt: robots that differ in how they steer share them.
 #[derive(Default)]
 pub(crate) struct Drafts<'a>(Vec<Draft<'a>>);
@@ -60,7 +63,7 @@ struct Draft<'a> {
 
 impl<'a> Drafts<'a> {
     /// The smoothed way of `attempt` for the outline `geometry`, which `make` makes the first time.
-    fn of(
+    pub(crate) fn of(
         &mut self,
         geometry: &'a dyn RobotGeometry,
         attempt: usize,
@@ -132,7 +135,7 @@ fn sample_guide(
 
 /// What is tried in turn: as set; more respect for walls; less, for a rounder path;
 /// every cell. The last two let the goal's heading go.
-pub(crate) fn attempts(settings: &GuideSettings, resolution_m: f64) -> [Attempt; 4] {
+pub(crate) fn attempts(settings: &GuideSettings, resolution_m: f64) -> [Attempt; ATTEMPTS] {
     let (weight, pull_per_m2, margin_m) =
         (settings.clearance_weight, settings.pull_per_m2, settings.margin_m);
     let base = Attempt { weight, pull_per_m2, margin_m, aim_goal: true };
