@@ -372,6 +372,7 @@ pub(crate) struct Export {
 }
 
 #[derive(Debug, Args)]
+#[command(mut_args(of_a_library))]
 pub(crate) struct Serve {
     /// The folder that `sharp solve` wrote; with --library a map, in which goals come as lines.
     #[arg(value_name = "PLAN_DIR|MAP")]
@@ -386,6 +387,12 @@ pub(crate) struct Serve {
     /// With --library: none, nominal, harsh or biased, also with a factor as in nominal*2, or a noise file (.ron).
     #[arg(long, default_value = "nominal", value_name = "NAME|FILE")]
     pub(crate) noise: String,
+}
+
+/// What a plan has settled can be asked for with a library only.
+fn of_a_library(arg: clap::Arg) -> clap::Arg {
+    let is_settled = ["robot", "options", "regions", "metric", "noise"].contains(&arg.get_id().as_str());
+    if is_settled { arg.requires("library") } else { arg }
 }
 
 #[derive(Debug, Args)]

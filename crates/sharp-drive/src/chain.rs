@@ -62,8 +62,8 @@ impl Chain {
     ) -> ChainRun {
         episode.begin(start, seed, number);
         let observation = self.first(start, episode.vehicle().noise());
-        let automaton = Automaton::new(Arc::clone(&self.links), observation);
-        let mut controller = ChainController { world, policies: &mut self.policies, automaton, entered: 0 };
+        let links = Arc::clone(&self.links);
+        let mut controller = ChainController::new(world, links, &mut self.policies, observation);
         let end = episode.drive(&mut controller, &Supervisor::silent());
         let arrival = controller.automaton.observation().state;
         ChainRun { visits: controller.automaton.visits().to_vec(), arrival, end }
@@ -76,15 +76,28 @@ impl Chain {
 }
 
 /// Lets each option's policy drive until the option is done or its horizon is used up.
-struct ChainController<'a> {
+#[derive(Debug)]
+pub struct ChainController<'a, P = OptionPolicy> {
     world: &'a World,
-    policies: &'a mut [OptionPolicy],
+    policies: &'a mut [P],
     automaton: Automaton,
     /// Options whose policy knows that it was entered.
     entered: usize,
 }
 
-impl Controller for ChainController<'_> {
+impl<'a, P: Policy> ChainController<'a, P> {
+    /// Drives `links` one after the other, each by its policy, from where the robot first observes itself.
+    ///
+    /// # Panics
+    /// If there are not as many policies as links.
+    #[must_use]
+    pub fn new(world: &'a World, links: Arc<[Link]>, policies: &'a mut [P], first: Observation) -> Self {
+        assert_eq!(links.len(), policies.len(), "a policy for each option");
+        Self { world, policies, automaton: Automaton::new(links, first), entered: 0 }
+    }
+}
+
+impl<P: Policy> Controller for ChainController<'_, P> {
     fn decide(&mut self) -> Decision {
         if !self.automaton.advance() {
             return Decision::Reached;

@@ -58,7 +58,7 @@ mod world;
 mod test_worlds;
 
 pub use automaton::{Automaton, Link, Visit};
-pub use chain::{ChainRun, Driver};
+pub use chain::{ChainController, ChainRun, Driver};
 pub use command::Command;
 pub use cost::{CostModel, DriveRow, GuideEnds, PredictedCost, RiskSamples, TimeSamples, drive_rows};
 pub use count::{SuccessCount, wilson95};

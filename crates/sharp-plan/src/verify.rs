@@ -64,11 +64,16 @@ impl Solution {
         self.composed.as_ref().map_or_else(|| self.predicted.rate(), |odds| odds.success)
     }
 
-    /// What a use of the plan is expected to cost, seconds.
+    /// What a use of the plan is expected to cost, seconds. One failure in a few hundred runs would decide between two plans:
+    /// the chance of failure is the mean of what may be after the runs (Jeffreys' prior), not their share.
     pub(crate) fn cost_s(&self, failure_cost_s: f64) -> f64 {
         match &self.composed {
             Some(odds) => expected_cost_s(odds.time_s, odds.success, failure_cost_s),
-            None => self.estimate().cost_s(failure_cost_s),
+            None => {
+                let SuccessEstimate { count, mean_time_s } = self.estimate();
+                let success = (f64::from(count.successes) + 0.5) / (f64::from(count.episodes) + 1.0);
+                expected_cost_s(mean_time_s, success, failure_cost_s)
+            }
         }
     }
 }
@@ -216,5 +221,19 @@ mod tests {
         let count = |episodes, successes| SuccessCount { episodes, successes };
         assert_eq!(counts, [count(3, 2), count(2, 1)]);
         assert_eq!(of_option(&runs, 0).mean_time_s, 1.0);
+    }
+
+    #[test]
+    fn one_failure_does_not_decide_between_plans_that_ran_a_few_hundred_times() {
+        let cost_s = |successes, episodes, predicted_time_s| {
+            let pose = Pose::new(0.0, 0.0, 0.0);
+            let predicted = SuccessCount { episodes, successes };
+            let query = Query { start: pose, goal: pose };
+            let solution = Solution { query, steps: Vec::new(), predicted, predicted_time_s, composed: None };
+            solution.cost_s(1000.0)
+        };
+        assert!(cost_s(383, 384, 11.0) < cost_s(256, 256, 14.0), "a faster plan that failed once");
+        assert!(cost_s(380, 384, 11.0) > cost_s(256, 256, 14.0), "it failed four times");
+        assert!(cost_s(0, 256, 0.0) > 1e6, "it never arrived");
     }
 }

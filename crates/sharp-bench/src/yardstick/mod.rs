@@ -16,8 +16,8 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use sharp_drive::{
-    Automaton, Controller, Decision, Episode, EpisodeEnd, EpisodeRules, FAILURE_COST_S, InitialStates, Link,
-    Motion, Mppi, MppiSettings, Observation, OptionPolicy, Policy, Prior, SuccessEstimate, Supervisor, World,
+    ChainController, Episode, EpisodeEnd, EpisodeRules, FAILURE_COST_S, InitialStates, Link, Mppi,
+    MppiSettings, Observation, OptionPolicy, Policy, Prior, SuccessEstimate, Supervisor, World,
 };
 use sharp_guide::GuidedOption;
 use sharp_sim::{EpisodeBias, EpisodeNoise, NoiseModel, SimulatorKind};
@@ -62,10 +62,10 @@ impl YardstickOption<'_> {
             let bias = EpisodeNoise::new(self.noise, seed, number).bias();
             let mut episode = blank.clone();
             episode.begin(start, seed, number);
-            let automaton = Automaton::new(Arc::clone(&links), Observation::first(start, self.noise));
-            let policy = policy(number, bias);
-            let mut driver = OptionDriver { world: self.world, policy, automaton, has_entered: false };
-            let end = episode.drive(&mut driver, &Supervisor::silent());
+            let mut policies = [policy(number, bias)];
+            let first = Observation::first(start, self.noise);
+            let mut chain = ChainController::new(self.world, Arc::clone(&links), &mut policies, first);
+            let end = episode.drive(&mut chain, &Supervisor::silent());
             (end == EpisodeEnd::Reached, episode.record().time_s)
         };
         let ends: Vec<(bool, f64)> = (0..episodes).into_par_iter().map(drive).collect();
@@ -102,36 +102,5 @@ impl YardstickOption<'_> {
             informed.expected_cost_s(&start, EpisodeNoise::new(noise, runs.1, number).bias())
         });
         (expected_s.sum::<f64>() / f64::from(episodes.max(1)), costs)
-    }
-}
-
-/// Lets one policy drive one option.
-struct OptionDriver<'a, P> {
-    world: &'a World,
-    policy: P,
-    automaton: Automaton,
-    has_entered: bool,
-}
-
-impl<P: Policy> Controller for OptionDriver<'_, P> {
-    fn decide(&mut self) -> Decision {
-        if !self.automaton.advance() {
-            return Decision::Reached;
-        }
-        if self.automaton.is_late() {
-            return Decision::Lost;
-        }
-        if let Some(decision) = self.automaton.maneuver(self.world) {
-            return decision;
-        }
-        let situation = self.automaton.situation(self.world);
-        if !std::mem::replace(&mut self.has_entered, true) {
-            self.policy.enter(&situation);
-        }
-        Decision::Drive(self.policy.decide(&situation))
-    }
-
-    fn observe(&mut self, motion: &Motion) {
-        self.automaton.observe(self.world, motion);
     }
 }

@@ -224,8 +224,8 @@ fn unlearnt(lines: &[&PaperLine]) -> String {
     for line in lines {
         let PaperRow { env, robot, options, problem, .. } = &line.row;
         for leg in line.trained().filter(is_short) {
-            let best = leg.curve.iter().map(|&(_, value, ..)| value).fold(f64::NEG_INFINITY, f64::max);
-            let last = leg.curve.last().map_or([0.0; 2], |&(_, _, with, without)| [with, without]);
+            let best = leg.curve.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            let [with, without] = best.map_or([0.0; 2], |&(_, _, with, without)| [with, without]);
             _ = writeln!(
                 text,
                 "| {env} P{problem} {robot} {options} | {} | {:.1} | {} | {} | {} | {:.0}, {:.0} % |",
@@ -233,16 +233,16 @@ fn unlearnt(lines: &[&PaperLine]) -> String {
                 leg.length_m,
                 leg.env_steps,
                 if leg.stop.is_none() { "time was up" } else { "steps" },
-                if best.is_finite() { format!("{best:.0}") } else { "-".to_owned() },
-                100.0 * last[0],
-                100.0 * last[1],
+                best.map_or_else(|| "-".to_owned(), |(_, value, ..)| format!("{value:.0}")),
+                100.0 * with,
+                100.0 * without,
             );
         }
     }
     if text.is_empty() {
         return text;
     }
-    "\nTrainings that did not meet their stop, with the best return and the last success with and without contact:\n\n\
+    "\nTrainings that did not meet their stop, with the evaluation of the best return: success with and without contact:\n\n\
      | problem | option | m | steps | ended by | best return | success |\n|---|---|---|---|---|---|---|\n"
         .to_owned()
         + &text
