@@ -62,6 +62,9 @@ fn scalars(progress: &Progress<'_>, fps: f64) -> Vec<(String, f64)> {
     if progress.updates > 0 {
         add("train/n_updates", progress.updates as f64);
     }
+    if progress.began_at > 0 {
+        add("train/began_at", progress.began_at as f64);
+    }
     if let Some(evaluation) = progress.evaluation {
         add("eval/mean_reward", evaluation.mean_return);
         add("eval/mean_ep_length", evaluation.mean_steps);

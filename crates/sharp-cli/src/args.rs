@@ -141,14 +141,14 @@ pub(crate) enum Kind {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Learning {
-    /// Followers and the shipped prior by their certificates; training where none holds.
+    /// The shipped prior; a hand-written follower where it succeeds too rarely, and further training where that is not enough.
     Fast,
     /// The paper's protocol.
     Paper,
     /// The same with smaller networks, a stop at 97 % success without contact, and a reward that also pays for the heading on
     /// arrival.
     PaperTuned,
-    /// The shipped prior as it is, certified: what learning on the map is worth.
+    /// The shipped prior as it is, only measured: the difference to `fast` is what learning on the map is worth.
     Prior,
 }
 

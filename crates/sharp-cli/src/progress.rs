@@ -122,6 +122,9 @@ fn training_text(
     if let Some(most) = progress.max_env_steps {
         text += &format!(" of at most {most}");
     }
+    if progress.began_at > 0 {
+        text += &format!(" (anew from {})", progress.began_at);
+    }
     if let Some(point) = evaluation {
         text += &format!(", mean return {:.0}", point.mean_return);
         if let Some(StopRule::MeanReturn(wanted)) = progress.stop {

@@ -5,7 +5,7 @@
 //! one text file that names its weights by their hash: a reader finds the old option or the new one,
 //! never a mix. Options that are saved together are first written to one file, the intent, whose name
 //! appears at once: a reader finds all of them or none, wherever the writer was killed. When the map
-//! changes, an option whose corridor did not change keeps its policy and its certificate
+//! changes, an option whose corridor did not change keeps its policy and its estimate
 //! ([`OptionLibrary::adopt`]).
 
 use std::collections::{BTreeMap, BTreeSet};

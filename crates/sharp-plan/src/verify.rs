@@ -65,7 +65,7 @@ impl Solution {
     }
 
     /// What a use of the plan is expected to cost, seconds. One failure in a few hundred runs would decide between two plans:
-    /// the chance of failure is the mean of what may be after the runs (Jeffreys' prior), not their share.
+    /// the chance of failure is the mean of what may be after the runs (Jeffreys' rule), not their share.
     pub(crate) fn cost_s(&self, failure_cost_s: f64) -> f64 {
         match &self.composed {
             Some(odds) => expected_cost_s(odds.time_s, odds.success, failure_cost_s),

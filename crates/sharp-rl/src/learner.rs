@@ -100,6 +100,8 @@ pub struct Progress<'a> {
     pub actor: &'a Actor,
     /// Environment steps so far, all environments together. Evaluation is not counted.
     pub env_steps: u64,
+    /// Environment steps after which the networks that learn now began; above 0 where the learner gave up and began anew.
+    pub began_at: u64,
     /// Gradient steps so far, or what the algorithm has in their place.
     pub updates: u64,
     /// Training episodes finished so far.
@@ -130,6 +132,7 @@ impl<'a> Progress<'a> {
         Self {
             actor,
             env_steps,
+            began_at: 0,
             updates: 0,
             episodes: 0,
             evaluation: None,

@@ -317,12 +317,14 @@ mod tests {
     fn a_hopeless_run_begins_anew_with_fresh_networks() {
         let mut seen = Vec::new();
         let mut watch = |progress: &Progress<'_>| {
-            seen.push((progress.env_steps, progress.updates));
+            seen.push((progress.env_steps, progress.updates, progress.began_at));
             ControlFlow::Continue(())
         };
         let trained =
             train(&mut [PointMass::default()], &hopeless(), &mut rng(5), &mut watch).expect("trains");
-        let updates_at = |steps| seen.iter().find(|seen| seen.0 == steps).expect("each step is reported").1;
+        let at = |steps| seen.iter().find(|seen| seen.0 == steps).expect("each step is reported");
+        assert_eq!([150, 151, 300, 301, 600].map(|steps| at(steps).2), [0, 150, 150, 300, 300]);
+        let updates_at = |steps| at(steps).1;
         // Each attempt has a warm-up of 60 steps, and half an update a step after that.
         let counts = [60, 150, 210, 300, 360, 600].map(updates_at);
         let earned = f64::from(short().sac.updates_per_step) * 90.0;

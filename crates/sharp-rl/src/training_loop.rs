@@ -317,6 +317,7 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
         ];
         let checkpoint = || self.state.to_bytes();
         let progress = Progress {
+            began_at: self.state.attempt.began_at,
             updates: self.state.updates,
             episodes: self.state.episodes,
             evaluation,
