@@ -128,7 +128,7 @@ impl Dispatcher {
     /// # Errors
     /// If the library cannot be written.
     pub fn drive(&mut self, reading: &Reading) -> Result<Vec<DispatchLine>, BenchError> {
-        let state = reading.state(self.state.as_ref());
+        let state = reading.state(&self.place.world.robot, self.state.as_ref());
         if !self.is_placed(&state.pose) {
             // What it knew of the robot before stays, for the next pose may be a real one again.
             return Ok(vec![standing("lost")]);

@@ -177,7 +177,8 @@ impl<'a> LegChain<'a> {
         };
         let mut drafts = Drafts::default();
         let mut sound = |robot: &GuideRobot<'a>| {
-            let mut paths = (0..ATTEMPTS).filter_map(|number| self.draft(part, ends, robot, number, &mut drafts));
+            let mut paths =
+                (0..ATTEMPTS).filter_map(|number| self.draft(part, ends, robot, number, &mut drafts));
             paths.find(|draft| draft.faults_m.is_empty() && is_straight(&draft.path))
         };
         let mut fitting = robots.iter().filter(|robot| fits(robot, gap_m));

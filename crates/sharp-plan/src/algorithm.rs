@@ -116,7 +116,7 @@ fn algorithm_1(
     let mut most = if method.verify_episodes == 0 { COMPOSED_MAX } else { VERIFIED_MAX };
     let mut best: Option<Solution> = None;
     let (mut chosen, mut measured): (_, Vec<Vec<LegId>>) = (vec![], vec![]);
-    for _ in 0..ATTEMPTS_MAX {
+    for attempt in 1..=ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
         let Some((_, p)) = cheapest(problem, &mut search, &policies) else {
             if monitor.should_stop() && best.is_none() {
@@ -145,7 +145,9 @@ fn algorithm_1(
             other.filter(|(_, other)| is_new(&names(other))).map_or(f64::INFINITY, |(seconds, _)| seconds)
         };
         let is_composed = method.verify_episodes == 0;
+        let may_go_on = attempt < ATTEMPTS_MAX || best.is_some();
         if !is_composed
+            && may_go_on
             && has_weak_option(problem, &p, &policies)
             && other_s(&mut search, &policies, &measured).is_finite()
         {

@@ -15,7 +15,7 @@ use sharp_space::Seed;
 
 use crate::abstraction::Abstraction;
 use crate::conditions::Conditions;
-use crate::files::FileError;
+use crate::files::{self, FileError};
 use crate::hand_over::{DrivenOption, HandOver, Identities, chain_key, drive_hand_over};
 use crate::learn::{LearnFailure, LearningTask, LearntPolicy};
 use crate::library::{OptionLibrary, StoredOption};
@@ -174,6 +174,7 @@ impl BuildingTask<'_> {
             let shared = &*library;
             let results: Vec<_> =
                 chunk.par_iter().map(|option| obtain(site, shared, option, monitor)).collect();
+            let mut is_stopped = false;
             for (option, result) in chunk.iter().zip(results) {
                 match result {
                     Obtained::Kept => work.kept += 1,
@@ -185,11 +186,18 @@ impl BuildingTask<'_> {
                         work.learnt.push(option.id);
                         keep(library, option, learnt)?;
                     }
-                    Obtained::Stopped => return Ok(()),
+                    Obtained::Stopped => {
+                        is_stopped = true;
+                        continue;
+                    }
                 }
                 if let Some(stored) = library.get(option.id) {
                     monitor.option(option, &stored.learnt);
                 }
+            }
+            // Those beside the one that was stopped may be done.
+            if is_stopped {
+                break;
             }
         }
         Ok(())
@@ -210,9 +218,16 @@ impl BuildingTask<'_> {
         let identities: Vec<Option<String>> =
             roster.options.iter().map(|option| known_identity(library, option, &mut hashed)).collect();
         let known = library.hand_overs_by_key();
+        // The blocks of an area are others than those of the building.
+        let blocks = match share.within {
+            None => roster.fingerprint.clone(),
+            Some(area) => {
+                format!("{}-{}", roster.fingerprint, &files::hash(format!("{area:?}").as_bytes())[..8])
+            }
+        };
         let (mut all, mut is_whole) = (Vec::with_capacity(roster.hand_overs.len()), true);
         for (unit, block) in roster.hand_overs.chunks(BLOCK).enumerate() {
-            let kept = library.read_block(&roster.fingerprint, unit)?;
+            let kept = library.read_block(&blocks, unit)?;
             let kept: BTreeMap<String, HandOver> =
                 kept.into_iter().map(|one| (one.key.clone(), one)).collect();
             let wanted: Vec<Option<Wanted>> = block
@@ -241,7 +256,7 @@ impl BuildingTask<'_> {
             let done: Vec<HandOver> = done.into_iter().map(|one| one.1).collect();
             done.iter().for_each(|one| monitor.hand_over(one));
             if fresh > 0 {
-                library.write_block(&roster.fingerprint, unit, &done)?;
+                library.write_block(&blocks, unit, &done)?;
             }
             all.extend(done);
         }
@@ -253,7 +268,7 @@ impl BuildingTask<'_> {
                 unguided: roster.unguided.clone(),
                 hand_overs: all,
             };
-            library.keep_building(building.with_rest_of(library.building(&roster.fingerprint)))?;
+            library.keep_building(building.with_rest_of(library.building(&roster.fingerprint)), &blocks)?;
         }
         Ok(())
     }

@@ -23,7 +23,7 @@ use crate::verify::PlannedOption;
 const STRAY_ACTIONS_MAX: u32 = 4;
 /// A robot nearer to its guide than this has not strayed, whatever state it is in, metres.
 const OFF_GUIDE_M: f64 = 0.6;
-/// Recoveries before the policy gives up.
+/// New plans in a row before the policy gives up.
 const RECOVERIES_MAX: u32 = 10;
 
 /// Counts of what went otherwise than planned.
@@ -51,6 +51,8 @@ pub struct ComposedPolicy {
     has_collided: bool,
     /// The last decision came with a new plan.
     is_recovering: bool,
+    /// New plans since the robot began, or was set down somewhere else.
+    tries: u32,
     events: Events,
 }
 
@@ -72,6 +74,7 @@ impl ComposedPolicy {
             still: StandstillDetector::new(state.pose),
             has_collided: false,
             is_recovering: false,
+            tries: 0,
             events: Events::default(),
         }
     }
@@ -86,12 +89,10 @@ impl ComposedPolicy {
 
     /// The robot was carried to `state`: there is a new way from there. False if there is none.
     pub(crate) fn relocate(&mut self, state: RobotState) -> bool {
-        let recoveries = self.events.recoveries + 1;
-        *self = Self {
-            events: Events { recoveries, ..self.events },
-            ..Self::new(Arc::clone(&self.plan), state, self.recovery)
-        };
-        self.begin_anew()
+        *self = Self { events: self.events, ..Self::new(Arc::clone(&self.plan), state, self.recovery) };
+        let is_found = self.begin_anew();
+        self.events.recoveries += u32::from(is_found);
+        is_found
     }
 
     /// The option that is running.
@@ -159,9 +160,10 @@ impl ComposedPolicy {
 
     /// A new plan from here; false if there is none, or too many were made.
     fn recover(&mut self) -> bool {
-        if self.events.recoveries >= RECOVERIES_MAX {
+        if self.tries >= RECOVERIES_MAX {
             return false;
         }
+        self.tries += 1;
         self.events.recoveries += 1;
         self.begin_anew()
     }

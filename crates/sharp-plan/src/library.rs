@@ -169,6 +169,15 @@ impl LibraryKey<'_> {
         if simulator != SimulatorKind::Kinematic {
             conditions += &format!(" {simulator:?}");
         }
+        // The caution of the prior follows from the cost of a failure, and options keep their guides.
+        if let Some(usual) = Method::by_name(&method.name) {
+            if method.failure_cost_s.to_bits() != usual.failure_cost_s.to_bits() {
+                conditions += &format!(" failure {:?} s", method.failure_cost_s);
+            }
+            if method.search.guide.planner != usual.search.guide.planner {
+                conditions += &format!(" {:?}", method.search.guide.planner);
+            }
+        }
         // What was trained with other settings is another policy.
         if method.keeps_trainings {
             conditions += &format!(" {:?}", method.learner);
@@ -374,38 +383,33 @@ impl OptionLibrary {
         elsewhere.chain(self.hand_overs().cloned()).map(|one| (one.key.clone(), one)).collect()
     }
 
-    /// Keeps what is known of a building, on disk first, and clears its blocks away.
-    pub(crate) fn keep_building(&mut self, building: Building) -> Result<(), FileError> {
+    /// Keeps what is known of a building, on disk first, and clears the blocks of `work` away.
+    pub(crate) fn keep_building(&mut self, building: Building, work: &str) -> Result<(), FileError> {
         let fingerprint = building.fingerprint.clone();
         if self.buildings.get(&fingerprint) != Some(&building) {
             if let Some(folder) = &self.folder {
                 files::write_ron(&folder.join(building_file(&fingerprint)), &building)?;
             }
-            self.buildings.insert(fingerprint.clone(), building);
+            self.buildings.insert(fingerprint, building);
             self.version += 1;
         }
-        if let Some(folder) = self.folder.as_ref().map(|folder| folder.join(blocks_folder(&fingerprint))) {
+        if let Some(folder) = self.folder.as_ref().map(|folder| folder.join(blocks_folder(work))) {
             // Blocks that stay behind are read and found to be the same.
             let _ = std::fs::remove_dir_all(folder);
         }
         Ok(())
     }
 
-    /// The hand-overs of block number `unit`, none if nobody did it.
-    pub(crate) fn read_block(&self, fingerprint: &str, unit: usize) -> Result<Vec<HandOver>, FileError> {
-        let path = self.folder.as_ref().map(|folder| block_file(folder, fingerprint, unit));
+    /// The hand-overs of block number `unit` of `work`, none if nobody did it.
+    pub(crate) fn read_block(&self, work: &str, unit: usize) -> Result<Vec<HandOver>, FileError> {
+        let path = self.folder.as_ref().map(|folder| block_file(folder, work, unit));
         path.filter(|path| path.exists()).map_or(Ok(vec![]), |path| files::read_ron(&path))
     }
 
-    /// Keeps the hand-overs of block number `unit` until the building is whole.
-    pub(crate) fn write_block(
-        &self,
-        fingerprint: &str,
-        unit: usize,
-        block: &[HandOver],
-    ) -> Result<(), FileError> {
+    /// Keeps the hand-overs of block number `unit` of `work` until that is done.
+    pub(crate) fn write_block(&self, work: &str, unit: usize, block: &[HandOver]) -> Result<(), FileError> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        files::write_ron(&block_file(folder, fingerprint, unit), &block)
+        files::write_ron(&block_file(folder, work, unit), &block)
     }
 
     /// A number that changes whenever an option or a building does.
@@ -538,7 +542,11 @@ fn file_name(id: OptionId) -> String {
 }
 
 fn option_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-    files_named(folder, |name| name.starts_with("c_") || name.starts_with("i_"))
+    let is_option = |name: &str| {
+        let mut bytes = name.bytes();
+        bytes.next().is_some_and(|family| family.is_ascii_lowercase()) && bytes.next() == Some(b'_')
+    };
+    files_named(folder, is_option)
 }
 
 /// The RON files in `folder` whose names `is_wanted`, sorted; none if there is no such folder.
@@ -574,12 +582,12 @@ fn building_file(fingerprint: &str) -> String {
     format!("{BUILDING}{fingerprint}.ron")
 }
 
-fn blocks_folder(fingerprint: &str) -> String {
-    format!("hand-overs-{fingerprint}")
+fn blocks_folder(work: &str) -> String {
+    format!("hand-overs-{work}")
 }
 
-fn block_file(folder: &Path, fingerprint: &str, unit: usize) -> PathBuf {
-    folder.join(blocks_folder(fingerprint)).join(format!("{unit:05}.ron"))
+fn block_file(folder: &Path, work: &str, unit: usize) -> PathBuf {
+    folder.join(blocks_folder(work)).join(format!("{unit:05}.ron"))
 }
 
 /// What the files of whole buildings in `folder` say, by fingerprint.

@@ -337,7 +337,10 @@ impl<'a> OwnStretch<'a> {
         let states = if begin == 0 {
             InitialStates::exactly(RobotState::at_rest(query.start))
         } else {
-            options[0] = from_run_up(&options[0], from.map_or(0.0, |cut| way_m(plan, begin, cut)));
+            // The middle at which a leg is cut must stay its middle.
+            if let Some(cut) = from.filter(|&cut| cut > begin) {
+                options[0] = from_run_up(&options[0], way_m(plan, begin, cut));
+            }
             InitialStates::spread(world, &options[0], &PASSING, STATE_POOL, seed)
         };
         let policies = options.iter().map(|leg| &policies.learnt(leg.id).policy).collect();

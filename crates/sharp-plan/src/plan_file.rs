@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sharp_drive::{SpeedLimits, SuccessCount, SuccessEstimate, World};
+use sharp_drive::{Prior, SpeedLimits, SuccessCount, SuccessEstimate, World};
 use sharp_guide::{Departure, Goal, GuidePath, GuidedOption, LegId, OptionSpace};
 use sharp_options::{OptionKind, OptionSettings};
 use sharp_rbvd::{Rbvd, StateAbstraction, StateId};
@@ -130,6 +130,9 @@ struct PlanFile {
     robot: RobotModel,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     speed_limits: Option<SpeedLimits>,
+    /// The file of a prior that is not the shipped one; recovery drives by it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    prior: Option<String>,
     noise: NoiseModel,
     method: String,
     search: SearchSettings,
@@ -187,11 +190,14 @@ impl Plan {
         let path = folder.join(PLAN_FILE);
         files::write_ron_under(&folder.join(ABSTRACTION_FILE), abstraction, &path)?;
         let steps = self.solution.steps.iter().map(|step| step_file(step, folder));
+        let prior = self.world.own_prior.as_deref();
+        let prior = prior.map(|prior| files::write_blob(folder, &prior.to_bytes(), "safetensors"));
         let file = PlanFile {
             format: FORMAT,
             map: map_hash(&self.world.grid),
             robot: (*self.world.robot).clone(),
             speed_limits: self.world.speed_limits.as_deref().cloned(),
+            prior: prior.transpose()?,
             noise: self.noise.clone(),
             method: self.method.name.clone(),
             search: self.method.search,
@@ -224,6 +230,13 @@ impl Plan {
         let world = World::new(grid, file.robot);
         let world = match file.speed_limits {
             Some(limits) => world.with_speed_limits(limits),
+            None => world,
+        };
+        let world = match file.prior {
+            Some(name) => {
+                let prior = Prior::from_bytes(&files::read_blob(folder, &name)?);
+                world.with_prior(prior.map_err(|error| FileError::content(&folder.join(&name), error))?)
+            }
             None => world,
         };
         let goal = goal_of(file.goal, &world, method.search.goal_heading_tolerance_rad);

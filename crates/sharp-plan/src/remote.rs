@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use sharp_drive::{Command, Controller, Decision, Motion};
 use sharp_guide::LegId;
-use sharp_sim::{ActionSettings, BACK_OFF_MPS, RobotState};
+use sharp_sim::{ActionSettings, BACK_OFF_MPS, Drive, RobotModel, RobotState};
 use sharp_space::{Heading, Pose, Vector, trig};
 
 use crate::plan_file::Plan;
@@ -18,6 +18,10 @@ const PATIENCE: f64 = 3.0;
 /// A robot is taken to have been carried, or wrong about its place before, if it is further from its last pose than
 /// twice what it can drive in an action, and this much more, metres.
 const CARRIED_M: f64 = 0.5;
+/// A robot that was lost is looked at again once it has moved further than this, metres, or turned further, radians.
+const MOVED: (f64, f64) = (0.1, 0.2);
+/// What a slower car turns says little of how it steers, metres per second.
+const STEERS_FROM_MPS: f64 = 0.1;
 
 /// What a robot outside tells of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,34 +80,45 @@ pub struct RemoteDriver {
     state: RobotState,
     pending: Pending,
     recovery: bool,
-    max_speed_mps: f64,
-    /// No way leads on from where the robot was carried.
-    is_stranded: bool,
+    robot: Arc<RobotModel>,
+    /// Where no way led on; somewhere else there may be one.
+    lost_at: Option<Pose>,
 }
 
 /// The last answer, until its outcome is known.
 #[derive(Clone, Copy, Debug)]
 enum Pending {
     Nothing,
+    Stand,
     Command(Command),
     BackOff { from: Pose, distance_m: f64, actions: u32 },
 }
 
 impl Reading {
-    /// The robot's state, if it was in the state `before` one action ago: motion that was not told is taken from there.
+    /// The state of `robot`, if it was in the state `before` one action ago: motion that was not told is taken from there.
     #[must_use]
-    pub fn state(&self, before: Option<&RobotState>) -> RobotState {
+    pub fn state(&self, robot: &RobotModel, before: Option<&RobotState>) -> RobotState {
         let mut state = RobotState::at_rest(self.pose);
         let action_s = ActionSettings::default().action_s;
         if let Some(before) = before {
             state.velocity = before.pose.to_local(self.pose.position) / action_s;
             state.yaw_rate_radps = before.pose.heading.turn_to(self.pose.heading) / action_s;
-            state.steer_rad = before.steer_rad;
         }
         if let Some(speed_mps) = self.speed_mps {
             state.velocity = Vector::new(speed_mps, 0.0);
         }
         state.yaw_rate_radps = self.yaw_rate_radps.unwrap_or(state.yaw_rate_radps);
+        // Nobody tells how the wheels roll: as the body moves.
+        state.wheel_speed_mps = state.velocity.x;
+        match robot.drive {
+            Drive::Differential { .. } => state.wheel_yaw_rate_radps = state.yaw_rate_radps,
+            Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => {
+                let curve = wheelbase_m * state.yaw_rate_radps;
+                let speed_mps = state.velocity.x.abs().max(STEERS_FROM_MPS);
+                let steer_rad = trig::atan2(curve, speed_mps) * state.velocity.x.signum();
+                state.steer_rad = steer_rad.clamp(-max_steer_rad, max_steer_rad);
+            }
+        }
         state
     }
 }
@@ -115,7 +130,8 @@ impl RemoteDriver {
     /// If there is no plan.
     #[must_use]
     pub fn new(plans: Vec<Arc<Plan>>, first: &Reading, recovery: bool) -> Self {
-        Self::from_state(plans, first.state(None), recovery)
+        let robot = Arc::clone(&plans.first().expect("a tour has a plan").world.robot);
+        Self::from_state(plans, first.state(&robot, None), recovery)
     }
 
     /// The same for a robot that is now in `state`.
@@ -124,9 +140,9 @@ impl RemoteDriver {
     /// If there is no plan.
     #[must_use]
     pub fn from_state(plans: Vec<Arc<Plan>>, state: RobotState, recovery: bool) -> Self {
-        let max_speed_mps = plans.first().expect("a tour has a plan").world.robot.max_speed_mps;
+        let robot = Arc::clone(&plans.first().expect("a tour has a plan").world.robot);
         let policy = TourPolicy::new(plans, state, recovery);
-        Self { policy, state, pending: Pending::Nothing, recovery, max_speed_mps, is_stranded: false }
+        Self { policy, state, pending: Pending::Nothing, recovery, robot, lost_at: None }
     }
 
     /// How far the plan that runs has come: the number of its leg, from 0, and the share of its guide that is driven.
@@ -137,19 +153,28 @@ impl RemoteDriver {
 
     /// What the robot has to do next; it was told to come back after one action.
     pub fn answer(&mut self, reading: &Reading) -> Instruction {
-        self.answer_in(reading.state(Some(&self.state)))
+        self.answer_in(reading.state(&self.robot, Some(&self.state)))
     }
 
     /// The same for a robot that is now in `state`.
     pub fn answer_in(&mut self, state: RobotState) -> Instruction {
         let before = std::mem::replace(&mut self.state, state);
-        let driven_max_m = 2.0 * self.max_speed_mps * ActionSettings::default().action_s + CARRIED_M;
+        let driven_max_m = 2.0 * self.robot.max_speed_mps * ActionSettings::default().action_s + CARRIED_M;
         let is_carried = before.pose.distance_m(&state.pose) > driven_max_m;
-        if self.recovery && (is_carried || self.is_stranded) {
+        let is_elsewhere = |at: Pose| {
+            let turned_rad = at.heading.turn_to(state.pose.heading).abs();
+            at.distance_m(&state.pose) > MOVED.0 || turned_rad > MOVED.1
+        };
+        if self.recovery && (is_carried || self.lost_at.is_some_and(is_elsewhere)) {
             return self.carried();
+        }
+        if self.lost_at.is_some() {
+            return self.lost();
         }
         match self.pending {
             Pending::Nothing => {}
+            // Somebody may have moved it meanwhile.
+            Pending::Stand => self.policy.observe(&stood(state)),
             Pending::Command(command) => self.policy.observe(&Motion::commanded(command, state)),
             Pending::BackOff { from, distance_m, actions } => {
                 let driven_m = from.distance_m(&state.pose);
@@ -158,8 +183,7 @@ impl RemoteDriver {
                     self.pending = Pending::BackOff { from, distance_m, actions: actions + 1 };
                     return self.backwards(distance_m - driven_m);
                 }
-                self.policy
-                    .observe(&Motion { command: None, ..Motion::commanded(Command::default(), state) });
+                self.policy.observe(&stood(state));
             }
         }
         self.decide()
@@ -167,10 +191,9 @@ impl RemoteDriver {
 
     /// What the robot has to do now that it is somewhere else than its last instruction leads.
     fn carried(&mut self) -> Instruction {
-        self.is_stranded = !self.policy.relocate(RobotState::at_rest(self.state.pose));
-        if self.is_stranded {
-            self.pending = Pending::Nothing;
-            return self.instruction(None, 0.0, RemoteStatus::Lost);
+        self.lost_at = None;
+        if !self.policy.relocate(RobotState::at_rest(self.state.pose)) {
+            return self.lost();
         }
         let told = self.decide();
         let is_new = told.status == RemoteStatus::Running;
@@ -185,7 +208,7 @@ impl RemoteDriver {
                 let point = command.to_world(&state.pose);
                 // What is no number moves no robot: simulated ones stop, and others are told to.
                 if ![point.x, point.y, command.speed_mps].iter().all(|number| number.is_finite()) {
-                    return self.instruction(None, 0.0, RemoteStatus::Lost);
+                    return self.lost();
                 }
                 self.pending = Pending::Command(command);
                 let towards = point - state.pose.position;
@@ -196,9 +219,21 @@ impl RemoteDriver {
                 self.pending = Pending::BackOff { from: state.pose, distance_m, actions: 1 };
                 self.backwards(distance_m)
             }
-            Decision::Reached => self.instruction(None, 0.0, RemoteStatus::Reached),
-            Decision::Lost => self.instruction(None, 0.0, RemoteStatus::Lost),
+            Decision::Reached => {
+                self.pending = Pending::Stand;
+                self.instruction(None, 0.0, RemoteStatus::Reached)
+            }
+            Decision::Lost => self.lost(),
         }
+    }
+
+    /// The robot has to stand; if it may recover, until somebody moves it.
+    fn lost(&mut self) -> Instruction {
+        self.pending = Pending::Stand;
+        if self.recovery && self.lost_at.is_none() {
+            self.lost_at = Some(self.state.pose);
+        }
+        self.instruction(None, 0.0, RemoteStatus::Lost)
     }
 
     const fn status(&self) -> RemoteStatus {
@@ -214,6 +249,11 @@ impl RemoteDriver {
     fn instruction(&self, waypoint: Option<Pose>, speed_mps: f64, status: RemoteStatus) -> Instruction {
         Instruction { waypoint, speed_mps, option: self.policy.option().id, status }
     }
+}
+
+/// What came of an action that no policy commanded.
+fn stood(after: RobotState) -> Motion {
+    Motion { command: None, ..Motion::commanded(Command::default(), after) }
 }
 
 #[cfg(test)]
@@ -278,6 +318,56 @@ mod tests {
         let ahead = told.waypoint.expect("a way leads on");
         assert!(ahead.distance_m(&Pose::new(5.0, 2.2, 0.0)) < 1.0, "from where it is: {told:?}");
         assert_eq!(driver.answer(&at(goal.x, goal.y)).status, RemoteStatus::Reached, "set down at the goal");
+    }
+
+    #[test]
+    fn a_robot_that_is_pushed_from_the_goal_drives_back() {
+        let plan = plan(OptionKind::Interface);
+        let goal = plan.solution.query.goal.position;
+        let mut driver = RemoteDriver::new(vec![plan], &at(1.0, 2.2), true);
+        driver.answer(&at(1.0, 2.2));
+        assert_eq!(driver.answer(&at(goal.x, goal.y)).status, RemoteStatus::Reached);
+        let pushed = [0.3, 0.6, 0.9].map(|off| driver.answer(&at(goal.x - off, goal.y)));
+        let ahead = pushed[2].waypoint.expect("it is to drive");
+        assert!(ahead.position.x > goal.x - 0.9, "back to the goal: {pushed:?}");
+        assert_ne!(pushed[2].status, RemoteStatus::Reached);
+    }
+
+    #[test]
+    fn a_lost_robot_gets_a_way_once_it_was_moved() {
+        let mut driver = RemoteDriver::new(vec![plan(OptionKind::Interface)], &at(1.0, 2.2), true);
+        // It cannot move: new plans do not help it.
+        let answers: Vec<_> = (0..1000).map(|_| driver.answer(&at(1.0, 2.2)).status).collect();
+        assert_eq!(answers[999], RemoteStatus::Lost);
+        assert_eq!(driver.policy.events().recoveries, 10);
+        let told = [1.05, 1.15].map(|x| driver.answer(&at(x, 2.2)));
+        assert_eq!(told[0].status, RemoteStatus::Lost, "hardly moved");
+        assert_eq!(told[1].status, RemoteStatus::Recovering, "somewhere else: {told:?}");
+    }
+
+    #[test]
+    fn to_be_set_down_where_no_way_leads_on_uses_nothing_up() {
+        let mut driver = RemoteDriver::new(vec![plan(OptionKind::Interface)], &at(1.0, 2.2), true);
+        driver.answer(&at(1.0, 2.2));
+        let nowhere: Vec<_> = (0..20).map(|i| driver.answer(&at(-50.0 - f64::from(i), 2.2)).status).collect();
+        assert!(nowhere.iter().all(|&status| status == RemoteStatus::Lost), "{nowhere:?}");
+        assert_eq!(driver.policy.events().recoveries, 0);
+        assert_eq!(driver.answer(&at(1.0, 2.2)).status, RemoteStatus::Recovering);
+    }
+
+    #[test]
+    fn wheels_roll_and_steer_as_the_body_moves() {
+        let reading =
+            Reading { pose: Pose::new(0.0, 0.0, 0.0), speed_mps: Some(0.8), yaw_rate_radps: Some(0.5) };
+        let husky = reading.state(&RobotModel::husky(), None);
+        assert_eq!((husky.wheel_speed_mps, husky.wheel_yaw_rate_radps, husky.steer_rad), (0.8, 0.5, 0.0));
+        let limo = RobotModel::limo();
+        let Drive::Ackermann { wheelbase_m, .. } = limo.drive else { panic!("a car") };
+        let steer_rad =
+            |speed_mps| Reading { speed_mps: Some(speed_mps), ..reading }.state(&limo, None).steer_rad;
+        assert!((steer_rad(0.8) - trig::atan2(wheelbase_m * 0.5, 0.8)).abs() < 1e-12);
+        assert_eq!(steer_rad(-0.8), -steer_rad(0.8), "backwards the same wheels turn it the other way");
+        assert!(steer_rad(0.0).is_finite());
     }
 
     #[test]

@@ -21,8 +21,10 @@ pub enum RobotError {
     /// The text is not a robot in RON.
     #[error("robot description: {0}")]
     Syntax(#[from] SyntaxError),
-    /// The name is empty, too long or cannot be printed.
-    #[error("robot name is {name:?}, must be 1 to {NAME_MAX} characters that can be printed")]
+    /// The name is empty, too long, cannot be printed or is no name of a folder: libraries are named by it.
+    #[error(
+        "robot name is {name:?}, must be 1 to {NAME_MAX} characters that can be printed, without / and \\ and no dot first"
+    )]
     Name {
         /// The name.
         name: String,
@@ -240,7 +242,8 @@ impl RobotModel {
 
     pub(crate) fn validate(&self) -> Result<(), RobotError> {
         let length = self.name.chars().count();
-        if !(1..=NAME_MAX).contains(&length) || self.name.chars().any(char::is_control) {
+        let is_odd = |c: char| c.is_control() || matches!(c, '/' | '\\');
+        if !(1..=NAME_MAX).contains(&length) || self.name.starts_with('.') || self.name.contains(is_odd) {
             return Err(RobotError::Name { name: self.name.clone() });
         }
         let positive = |field, value, max| self.require(field, value, f64::MIN_POSITIVE, max);
@@ -367,5 +370,8 @@ mod tests {
             "robot description: line 17 \")\": Unexpected missing field named `max_speed_mps`",
         );
         refuse(HUSKY, "\"husky\"", "\"\"", "robot name is \"\", must be 1 to 64 characters");
+        for name in ["../husky", "fleet/husky", "/tmp/husky", ".husky"] {
+            refuse(HUSKY, "husky", name, &format!("robot name is {name:?}, must be 1 to 64 characters"));
+        }
     }
 }
