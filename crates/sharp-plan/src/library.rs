@@ -706,6 +706,30 @@ mod tests {
     }
 
     #[test]
+    fn options_of_other_families_are_read_again() {
+        let root = tempfile::tempdir().unwrap();
+        let steps = OptionId::Custom { family: 'w', from: StateId(0), to: StateId(2), number: 0 };
+        OptionLibrary::open(root.path(), "here").unwrap().insert(steps, stored(follower())).unwrap();
+        let opened = OptionLibrary::open(root.path(), "here").unwrap();
+        assert_eq!(opened.iter().map(|(id, _)| id).collect::<Vec<_>>(), [steps]);
+    }
+
+    #[test]
+    fn what_decides_policies_and_guides_decides_the_folder() {
+        let (world, _) =
+            crate::test_worlds::world(crate::test_worlds::HALL, sharp_options::OptionKind::Centroid);
+        let (noise, simulator) = (NoiseModel::nominal(), SimulatorKind::Kinematic);
+        let name = |method: &Method| {
+            LibraryKey { world: &world, noise: &noise, simulator, method, states: "" }.folder_name()
+        };
+        let usual = Method::fast();
+        assert_eq!(name(&usual), name(&usual.clone().composed()), "answers come from what was learnt");
+        let careful = Method { failure_cost_s: 33_000.0, ..usual.clone() };
+        let others = [careful, usual.clone().with_learn_and_link(), Method::paper()];
+        assert!(others.iter().all(|other| name(other) != name(&usual)));
+    }
+
+    #[test]
     fn an_option_is_adopted_where_world_and_corridor_are_the_same() {
         let root = tempfile::tempdir().unwrap();
         let mut library = OptionLibrary::open(root.path(), "husky-1-mapa").unwrap();

@@ -333,6 +333,11 @@ mod tests {
 
     fn saved(kind: OptionKind) -> (Arc<Plan>, tempfile::TempDir) {
         let plan = test_worlds::plan(kind);
+        let folder = folder_of(&plan, kind);
+        (plan, folder)
+    }
+
+    fn folder_of(plan: &Plan, kind: OptionKind) -> tempfile::TempDir {
         let map = map_hash(&plan.world.grid);
         let file = AbstractionFile::new(
             map,
@@ -343,7 +348,20 @@ mod tests {
         );
         let folder = tempfile::tempdir().unwrap();
         plan.save(folder.path(), &file).unwrap();
-        (plan, folder)
+        folder
+    }
+
+    #[test]
+    fn a_plan_keeps_a_prior_of_its_own() {
+        let plan = Plan::clone(&test_worlds::plan(OptionKind::Centroid));
+        let read = |plan: &Plan| {
+            let folder = folder_of(plan, OptionKind::Centroid);
+            Plan::load(folder.path(), (*plan.world.grid).clone()).unwrap().world.own_prior
+        };
+        assert_eq!(read(&plan), None, "the shipped one is in the program");
+        let other = Prior::shipped(&RobotModel::limo());
+        let world = plan.world.clone().with_prior(other.clone());
+        assert_eq!(read(&Plan { world, ..plan }).as_deref(), Some(other));
     }
 
     #[test]

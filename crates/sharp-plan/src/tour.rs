@@ -355,6 +355,16 @@ mod tests {
     }
 
     #[test]
+    fn a_tour_of_plans_that_were_not_run_is_run() {
+        let plan = Plan::clone(&plan(OptionKind::Centroid));
+        let simulator = plan.world.simulator(SimulatorKind::Kinematic);
+        let plan = Arc::new(Plan { method: plan.method.clone().composed(), ..plan });
+        let tour = Tour::verified(vec![Arc::clone(&plan), plan], &*simulator);
+        assert_eq!(tour.predicted, SuccessCount { episodes: VERIFIED_MAX, successes: VERIFIED_MAX });
+        assert!(tour.predicted_time_s > 5.0, "8 m and back in {} s", tour.predicted_time_s);
+    }
+
+    #[test]
     fn one_plan_is_a_tour_that_runs_as_the_plan_does() {
         let plan = plan(OptionKind::Interface);
         let settings = RunSettings::new(&plan, 5, Seed(3));
