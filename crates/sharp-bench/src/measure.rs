@@ -214,7 +214,8 @@ impl Measurement<'_> {
         let clock_us = clock_us();
         let supervisor = Supervisor { clock_us: &clock_us, should_stop: &|| self.should_stop() };
         let NamedProblem { world, query, .. } = self.problem;
-        let driven = compare(contender, world, query, &self.comparison, &supervisor);
+        let mut driven = compare(contender, world, query, &self.comparison, &supervisor);
+        driven.retain(|one| one.end != EpisodeEnd::Stopped);
         self.stopwatch.stop();
         Measured { driven, ..Measured::default() }
     }
@@ -224,7 +225,8 @@ impl Measurement<'_> {
         let Measured { driven, env_steps, gradient_steps } = measured.unwrap_or(&nothing);
         let (problem, settings, watch) = (self.problem, self.settings, &self.stopwatch);
         let ended = |end: EpisodeEnd| driven.iter().filter(|one| one.end == end).count() as u32;
-        let count = SuccessCount { episodes: settings.episodes, successes: ended(EpisodeEnd::Reached) };
+        let episodes = driven.len() as u32;
+        let count = SuccessCount { episodes, successes: ended(EpisodeEnd::Reached) };
         let records = || driven.iter().map(|one| (one.end, &one.record));
         let planning_us = driven.iter().map(|one| one.record.planning_us).sum::<f64>();
         BaselineReport {

@@ -240,9 +240,9 @@ pub struct GoalReport {
 pub struct SolveReport {
     /// The name and version of the format.
     pub schema: &'static str,
-    /// `solved`, `no_plan` or `timeout`.
+    /// `solved`, `no_plan`, `timeout`, or `below_min_success` beside a plan.
     pub status: &'static str,
-    /// Why there is no plan.
+    /// Why it is not `solved`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// The name of the robot.

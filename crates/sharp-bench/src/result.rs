@@ -64,7 +64,7 @@ pub struct ResultLine {
     pub mean_sim_time_s: f64,
     /// The success that solving predicted, 0 to 1; 0 for the baselines.
     pub predicted_success: f64,
-    /// More executions of a plan, to hold against what it predicted: as many as its prediction took.
+    /// More executions of a plan, to hold against what it predicted: 1,000.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<SuccessCount>,
     /// How many of the plan's options had been learnt before.

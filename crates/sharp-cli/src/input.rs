@@ -31,6 +31,7 @@ pub(crate) fn map_called(name: &str, args: &ReadingArgs) -> Result<MapFile, Fail
     for mask in &args.keepout {
         // Unknown cells of a mask mean nothing, whatever they mean in the map.
         let keepout = load(mask, &LoadOptions { unknown_free: false, ..options })?;
+        map.warnings.extend(keepout.warnings.iter().map(|warning| format!("--keepout {mask}: {warning}")));
         if map.keep_out(&keepout.grid)? == 0 {
             map.warnings.push(format!("--keepout {mask}: covers no free cell of the map"));
         }

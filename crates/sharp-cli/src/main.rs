@@ -16,12 +16,14 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
 
-use crate::args::{Cli, Subcommands};
+use crate::args::{Cli, PriorCommand, Regions, Subcommands};
 use crate::outcome::{Exit, Failure, say};
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    progress::listen_for_interrupts();
+    if stops_gently(&cli.command) {
+        progress::listen_for_interrupts();
+    }
     let exit = dispatch(&cli).unwrap_or_else(|failure| {
         if cli.json {
             say!("{}", failure.to_json());
@@ -30,6 +32,20 @@ fn main() -> ExitCode {
         Exit::Broken
     });
     ExitCode::from(exit as u8)
+}
+
+/// Whether an interrupt is a wish to stop that the command asks for; all others end at once.
+const fn stops_gently(command: &Subcommands) -> bool {
+    matches!(
+        command,
+        Subcommands::Solve(_)
+            | Subcommands::Learn(_)
+            | Subcommands::Baseline(_)
+            | Subcommands::Eval(_)
+            | Subcommands::Jobs(_)
+            | Subcommands::Prior(PriorCommand::Train(_))
+            | Subcommands::Regions(Regions::Train(_))
+    )
 }
 
 fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
@@ -56,7 +72,9 @@ fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
         Subcommands::Eval(args) => commands::eval::run(args, cli.seed, cli.json),
         Subcommands::Jobs(command) => commands::jobs::run(command, cli.seed, cli.json),
         Subcommands::Completions { shell } => {
-            clap_complete::generate(*shell, &mut Cli::command(), "sharp", &mut std::io::stdout());
+            let mut script = Vec::new();
+            clap_complete::generate(*shell, &mut Cli::command(), "sharp", &mut script);
+            outcome::say_bytes(&script);
             Ok(Exit::Done)
         }
         Subcommands::Man { out } => commands::man::run(Cli::command(), out.as_deref(), cli.json),

@@ -158,3 +158,9 @@ pub(crate) fn print_line(line: fmt::Arguments<'_>) {
     use std::io::Write;
     let _ = writeln!(std::io::stdout(), "{line}");
 }
+
+/// Prints `bytes` on stdout; a reader that has gone away is no error.
+pub(crate) fn say_bytes(bytes: &[u8]) {
+    use std::io::Write;
+    let _ = std::io::stdout().write_all(bytes);
+}

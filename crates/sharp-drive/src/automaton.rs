@@ -160,9 +160,7 @@ impl Automaton {
             visit.half_s = Some(visit.time_s);
         }
         self.actions += 1;
-        if let Some(limits) = &world.speed_limits {
-            self.spared += 1.0 - limits.counts(motion.after.pose.position);
-        }
+        self.spared += 1.0 - world.action_share(motion.after.pose.position);
     }
 
     /// What the robot has to do that no policy does: leave the tight place in which the plan begins, and turn in place at a
@@ -188,8 +186,8 @@ impl Automaton {
         self.actions() >= self.link().option.horizon_actions()
     }
 
-    /// Actions since the option that runs was entered, as they count against its horizon: where a speed limit makes a
-    /// robot slow, less than one each.
+    /// Actions since the option that runs was entered, as they count against its horizon: where the robot or a speed limit is
+    /// slow, less than one each.
     #[must_use]
     pub const fn actions(&self) -> u32 {
         self.actions - self.spared as u32

@@ -98,6 +98,8 @@ pub enum EpisodeEnd {
     TimedOut,
     /// Where its controller gave up.
     Lost,
+    /// Where its supervisor stopped it: it says nothing of the controller.
+    Stopped,
 }
 
 /// The rules of an episode.
@@ -287,7 +289,10 @@ impl Episode {
 
     /// Lets `controller` drive until the episode ends.
     pub fn drive(&mut self, controller: &mut dyn Controller, supervisor: &Supervisor<'_>) -> EpisodeEnd {
-        while self.record.time_s < self.rules.time_limit_s && !(supervisor.should_stop)() {
+        while self.record.time_s < self.rules.time_limit_s {
+            if (supervisor.should_stop)() {
+                return EpisodeEnd::Stopped;
+            }
             let decision = self.decide(controller, supervisor);
             let motion = match self.carry_out(decision) {
                 Ok(motion) => motion,

@@ -196,7 +196,7 @@ impl<'a> MonteCarlo<'a> {
         episodes: Range<u32>,
         run: impl Fn(&mut Chain, &mut Episode, u64) -> T + Sync,
     ) -> Vec<T> {
-        let vehicle = self.world.vehicle(self.simulator, self.noise, true);
+        let vehicle = self.world.vehicle(self.simulator, self.noise, self.contact_ends);
         let rules = EpisodeRules::default().with_contact_ends(self.contact_ends);
         let (chain, episode) = (Chain::new(drivers), Episode::new(vehicle, rules));
         episodes

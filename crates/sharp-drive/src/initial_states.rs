@@ -24,7 +24,7 @@ pub struct StateSpread {
     pub radius_m: f64,
     /// Standard deviation of the heading around the guide's first direction, radians.
     pub heading_sd_rad: f64,
-    /// Largest speed, metres per second.
+    /// Largest speed, metres per second; no robot begins faster than it drives.
     pub speed_max_mps: f64,
 }
 
@@ -112,7 +112,8 @@ fn draw_state(world: &World, option: &GuidedOption, spread: &StateSpread, rng: &
     let turn = Normal::new(0.0, spread.heading_sd_rad).map_or(0.0, |normal| normal.sample(rng));
     let pose = Pose::at(position, Heading::new(start.heading.radians() + turn));
     let least = world.robot.min_speed_mps;
-    let speed = least + (spread.speed_max_mps - least).max(0.0) * rng.random::<f64>();
+    let most = spread.speed_max_mps.min(world.robot.max_speed_mps);
+    let speed = least + (most - least).max(0.0) * rng.random::<f64>();
     RobotState::rolling(pose, speed)
 }
 

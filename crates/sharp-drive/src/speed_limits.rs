@@ -103,11 +103,11 @@ impl SpeedLimits {
         };
         guide.poses().windows(2).map(delay_s).sum()
     }
+}
 
-    /// How much of an action counts against the horizon of an option for a robot at `point`, 0 to 1.
-    pub(crate) fn counts(&self, point: Point) -> f64 {
-        (self.at(point) / UNHURRIED_MPS).min(1.0)
-    }
+/// How much of an action counts against the horizon of an option for a robot that may drive this fast, 0 to 1.
+pub(crate) fn action_share(speed_mps: f64) -> f64 {
+    (speed_mps / UNHURRIED_MPS).min(1.0)
 }
 
 impl From<SpeedLimits> for SpeedLimitRuns {

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use sharp_guide::{GuideRobot, InflatedRobot, Steering, inflated_robots};
 use sharp_sim::{ActionSettings, NoiseModel, ObstacleMap, RobotModel, Simulator, SimulatorKind, Vehicle};
-use sharp_space::{FootprintChecker, OccupancyGrid, Pose, RobotGeometry};
+use sharp_space::{FootprintChecker, OccupancyGrid, Point, Pose, RobotGeometry};
 
 use crate::command::Command;
 use crate::motion_model::MotionModel;
 use crate::prior::Prior;
-use crate::speed_limits::SpeedLimits;
+use crate::speed_limits::{SpeedLimits, action_share};
 
 /// A vehicle in a simulator that is chosen at run time.
 pub type AnyVehicle = Vehicle<Box<dyn Simulator>>;
@@ -46,7 +46,7 @@ impl World {
     /// The same with another test of where the robot fits.
     #[must_use]
     pub fn with_geometry(grid: OccupancyGrid, robot: RobotModel, geometry: Arc<dyn RobotGeometry>) -> Self {
-        let obstacles = Arc::new(ObstacleMap::new(&grid, robot.footprint));
+        let obstacles = Arc::new(ObstacleMap::with_geometry(&grid, Arc::clone(&geometry)));
         let model = Arc::new(MotionModel::new(&robot));
         let inflated = inflated_robots(&geometry, robot.min_turning_radius_m()).into();
         let (grid, robot) = (Arc::new(grid), Arc::new(robot));
@@ -69,6 +69,12 @@ impl World {
     #[must_use]
     pub fn prior(&self) -> &Prior {
         self.own_prior.as_deref().unwrap_or_else(|| Prior::shipped(&self.robot))
+    }
+
+    /// How much of an action counts against the horizon of an option for a robot at `point`, 0 to 1.
+    pub(crate) fn action_share(&self, point: Point) -> f64 {
+        let limit_mps = self.speed_limits.as_ref().map_or(f64::INFINITY, |limits| limits.at(point));
+        action_share(limit_mps.min(self.robot.max_speed_mps))
     }
 
     /// `command` for a robot at `pose`, no faster than the speed limits allow.

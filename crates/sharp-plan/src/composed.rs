@@ -229,7 +229,8 @@ impl Controller for ComposedPolicy {
         }
         self.is_recovering = true;
         // Out of contact first: a forward-only robot with its nose at a wall cannot turn.
-        if self.has_collided && self.plan.world.robot.recovery_reverse_m > 0.0 {
+        let departs = self.automaton.link().option.departure.back_off_m > 0.0;
+        if self.has_collided && !departs && self.plan.world.robot.recovery_reverse_m > 0.0 {
             return Decision::BackOff { distance_m: self.plan.world.robot.recovery_reverse_m };
         }
         self.drive()

@@ -28,7 +28,7 @@ use crate::files::{self, FileError};
 use crate::hand_over::HandOver;
 use crate::learn::{LearntPolicy, Training};
 use crate::method::Method;
-use crate::plan_file::map_hash;
+use crate::plan_file::{AbstractionFile, map_hash};
 
 /// Raised whenever the files change their meaning.
 pub const FORMAT: u32 = 6;
@@ -381,6 +381,17 @@ impl OptionLibrary {
         let elsewhere = self.other_maps.iter().filter_map(|folder| read_buildings(folder).ok());
         let elsewhere = elsewhere.flat_map(BTreeMap::into_values).flat_map(|building| building.hand_overs);
         elsewhere.chain(self.hand_overs().cloned()).map(|one| (one.key.clone(), one)).collect()
+    }
+
+    /// Reads the abstractions that are kept beside the options of the world `key` and verifies their checksums; returns how
+    /// many there are.
+    ///
+    /// # Errors
+    /// Returns an error that names the damaged file.
+    pub fn check_abstractions(root: &Path, key: &str) -> Result<usize, FileError> {
+        let paths = files_named(&root.join(key), |name| name.starts_with("abstraction-"))?;
+        paths.iter().try_for_each(|path| files::read_ron::<AbstractionFile>(path).map(drop))?;
+        Ok(paths.len())
     }
 
     /// Keeps what is known of a building, on disk first, and clears the blocks of `work` away.

@@ -5,7 +5,7 @@ use sharp_drive::{
     SuccessEstimate, World, expected_cost_s,
 };
 use sharp_guide::{Departure, GuidePath, GuidedOption, LegId, Role};
-use sharp_sim::{BACK_OFF_MPS, NoiseModel};
+use sharp_sim::NoiseModel;
 
 use crate::method::{PriceRule, SearchSettings};
 
@@ -74,7 +74,7 @@ impl<'a> Pricer<'a> {
         let rest = option.guide.from_arc(careful_m);
         let Price { time_s, success } =
             self.of_guide(option.id, rest.as_ref().unwrap_or(&option.guide), next);
-        let leaving_s = back_off_m / BACK_OFF_MPS + careful_m / CAREFUL_MPS + DEPARTURE_S;
+        let leaving_s = back_off_m / self.world.robot.back_off_mps() + careful_m / CAREFUL_MPS + DEPARTURE_S;
         Price { time_s: time_s + leaving_s, success: success * DEPARTURE_SUCCESS }
     }
 

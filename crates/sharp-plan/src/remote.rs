@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use sharp_drive::{Command, Controller, Decision, Motion};
 use sharp_guide::LegId;
-use sharp_sim::{ActionSettings, BACK_OFF_MPS, Drive, RobotModel, RobotState};
+use sharp_sim::{ActionSettings, Drive, RobotModel, RobotState};
 use sharp_space::{Heading, Pose, Vector, trig};
 
 use crate::plan_file::Plan;
@@ -178,7 +178,8 @@ impl RemoteDriver {
             Pending::Command(command) => self.policy.observe(&Motion::commanded(command, state)),
             Pending::BackOff { from, distance_m, actions } => {
                 let driven_m = from.distance_m(&state.pose);
-                let actions_max = PATIENCE * distance_m / (BACK_OFF_MPS * ActionSettings::default().action_s);
+                let actions_max =
+                    PATIENCE * distance_m / (self.robot.back_off_mps() * ActionSettings::default().action_s);
                 if driven_m < distance_m - BACKED_OFF_WITHIN_M && f64::from(actions) < actions_max {
                     self.pending = Pending::BackOff { from, distance_m, actions: actions + 1 };
                     return self.backwards(distance_m - driven_m);
@@ -243,7 +244,7 @@ impl RemoteDriver {
     fn backwards(&self, left_m: f64) -> Instruction {
         let pose = self.state.pose;
         let behind = Pose::at(pose.to_world(Vector::new(-left_m, 0.0)), pose.heading);
-        self.instruction(Some(behind), -BACK_OFF_MPS, self.status())
+        self.instruction(Some(behind), -self.robot.back_off_mps(), self.status())
     }
 
     fn instruction(&self, waypoint: Option<Pose>, speed_mps: f64, status: RemoteStatus) -> Instruction {
@@ -261,6 +262,7 @@ mod tests {
     use sharp_drive::{OptionPolicy, Policy, Situation};
     use sharp_guide::Departure;
     use sharp_options::OptionKind;
+    use sharp_sim::BACK_OFF_MPS;
 
     use super::*;
     use crate::test_worlds::plan;

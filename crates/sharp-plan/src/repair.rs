@@ -1,10 +1,11 @@
 //! Repairing a plan: weak options choose and learn again, from the states in which they are entered.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 use sharp_drive::{ChainRun, Driver, SuccessCount};
-use sharp_guide::GuidedOption;
+use sharp_guide::{GuidedOption, LegId};
 use sharp_sim::RobotState;
 
 use crate::files::FileError;
@@ -36,6 +37,7 @@ pub(crate) struct Repair<'a> {
 pub(crate) fn repair(repair: &Repair<'_>, policies: &mut Policies<'_>) -> Result<bool, FileError> {
     let settings = repair.problem.method.repair;
     let mut runs = run_plan(repair, policies);
+    let mut tried = BTreeSet::new();
     for round in 0..settings.rounds {
         if repair.problem.monitor.should_stop() {
             return Ok(false);
@@ -45,7 +47,7 @@ pub(crate) fn repair(repair: &Repair<'_>, policies: &mut Policies<'_>) -> Result
         }
         let before: Vec<LearntPolicy> =
             repair.plan.iter().map(|option| policies.learnt(option.id).clone()).collect();
-        if !relearn_weak(repair, policies, &runs, u64::from(round))? {
+        if !relearn_weak(repair, policies, &runs, (u64::from(round), &mut tried))? {
             break;
         }
         let anew = run_plan(repair, policies);
@@ -81,13 +83,13 @@ fn keep(
     policies.keep(alone, learnt, &repair.problem.world.grid)
 }
 
-/// Learns the weak options again on the states in which they were entered in `runs`. Returns false if no option
-/// became better.
+/// Learns the weak options again on the states in which they were entered in `runs`; those that were `tried` before are not
+/// trained once more. Returns false if no option became better.
 fn relearn_weak(
     repair: &Repair<'_>,
     policies: &mut Policies<'_>,
     runs: &[ChainRun],
-    round: u64,
+    (round, tried): (u64, &mut BTreeSet<LegId>),
 ) -> Result<bool, FileError> {
     let plan = repair.plan;
     // n options that each fail at most a share (1 - wanted) / n make a plan that succeeds as wanted.
@@ -101,10 +103,12 @@ fn relearn_weak(
     let weak: Vec<usize> = (0..plan.len()).filter(|&index| is_to_blame(index)).collect();
     let shared = &*policies;
     let relearn = |&index: &usize| {
-        let weak = Weak { index, on_arrival: on_arrival[index], wanted, round };
+        let is_new = !tried.contains(&plan[index].id);
+        let weak = Weak { index, on_arrival: on_arrival[index], wanted, round, is_new };
         relearn(repair, shared, runs, &weak)
     };
     let results: Vec<_> = weak.par_iter().map(relearn).collect();
+    tried.extend(weak.iter().map(|&index| plan[index].id));
     let mut better = false;
     for (index, learnt) in weak.into_iter().zip(results) {
         if let Some(learnt) = learnt {
@@ -122,6 +126,8 @@ struct Weak {
     on_arrival: SuccessCount,
     wanted: f64,
     round: u64,
+    /// Not tried in an earlier round.
+    is_new: bool,
 }
 
 /// A policy for a weak option that succeeds more often than its present one on what `runs` arrived with.
@@ -132,7 +138,7 @@ fn relearn(
     weak: &Weak,
 ) -> Option<LearntPolicy> {
     let Repair { problem, plan, .. } = *repair;
-    let Weak { index, on_arrival, wanted, round } = *weak;
+    let Weak { index, on_arrival, wanted, round, is_new } = *weak;
     let (option, learner) = (&plan[index], &problem.method.learner);
     let seed = problem.seed.child(&format!("repair {}", option.id), round);
     let states = initial_states(problem, option, seed).with_arrivals(entries(runs, index));
@@ -155,8 +161,10 @@ fn relearn(
     let gain = (GAIN_MIN * f64::from(episodes)).ceil() as u32;
     let beaten = SuccessCount { episodes, successes: (successes + gain).min(episodes) - 1 };
     // Training is for options that are weak themselves, and once only; how a tight start is left is not learnt.
-    let may_train =
-        old.gradient_steps == 0 && option.departure.is_none() && on_arrival.rate() < learner.train_below();
+    let may_train = is_new
+        && old.gradient_steps == 0
+        && option.departure.is_none()
+        && on_arrival.rate() < learner.train_below();
     let monitor = OptionMonitor { monitor: problem.monitor, option, file: None };
     let new = learner.improve(&task, beaten, may_train, &monitor).ok()??;
     let (env_steps, gradient_steps) =

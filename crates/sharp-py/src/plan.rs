@@ -194,6 +194,7 @@ const fn outcome(end: EpisodeEnd) -> &'static str {
         EpisodeEnd::Collided => "collided",
         EpisodeEnd::TimedOut => "timed out",
         EpisodeEnd::Lost => "lost",
+        EpisodeEnd::Stopped => "stopped",
     }
 }
 

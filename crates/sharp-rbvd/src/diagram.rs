@@ -342,7 +342,7 @@ pub enum RbvdError {
 }
 
 /// More cells could overflow the length of a way that visits all of them.
-const CELLS_MAX: usize = (NONE / DIAGONAL) as usize;
+pub(crate) const CELLS_MAX: usize = (NONE / DIAGONAL) as usize;
 
 fn validate(frame: &GridFrame, regions: &[Region], settings: &RbvdSettings) -> Result<(), RbvdError> {
     let fields = [

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use sharp_space::{Cell, GridFrame, Region, RegionId};
 use thiserror::Error;
 
-use crate::diagram::{Rbvd, RbvdSettings, neighbors};
+use crate::diagram::{CELLS_MAX, Rbvd, RbvdSettings, neighbors};
 use crate::portal::{Portal, PortalId};
 use crate::space::NONE;
 use crate::state_grid::{StateGrid, StateGridError};
@@ -106,7 +106,7 @@ impl StoredRbvd {
         let lengths = self.cells.iter().map(|run| run.1);
         let found = lengths.fold(0, usize::saturating_add);
         let expected = self.frame.width.saturating_mul(self.frame.height);
-        if found != expected {
+        if found != expected || expected > CELLS_MAX {
             return Err(StoredRbvdError::Length { found, expected });
         }
         let count = self.regions.len();

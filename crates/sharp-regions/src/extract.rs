@@ -49,8 +49,8 @@ const THRESHOLD_STEP: f64 = 0.04;
 /// The regions of `heatmap` where the clearance is at least `min_clearance_m`, the radius of the
 /// robot's inscribed disc.
 ///
-/// Regions are connected, disjoint, at least `area_min_m2` large, and numbered in row-major order of
-/// their representatives.
+/// Regions are connected, disjoint, and numbered in row-major order of their representatives. They are at least
+/// `area_min_m2` large, but for the discs that cover a long piece: what is left at its end may be smaller.
 ///
 /// # Panics
 /// If the heat map and the clearance belong to grids of different sizes.

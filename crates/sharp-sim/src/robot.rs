@@ -10,6 +10,7 @@ use thiserror::Error;
 
 use crate::description::{self, SyntaxError};
 use crate::robot_file::RobotText;
+use crate::vehicle::BACK_OFF_MPS;
 
 /// Longer names do not fit into a table, characters.
 const NAME_MAX: usize = 64;
@@ -238,6 +239,12 @@ impl RobotModel {
         match self.drive {
             Drive::Differential { track_m, .. } | Drive::Ackermann { track_m, .. } => track_m,
         }
+    }
+
+    /// How fast it backs off, metres per second, forwards positive: [`BACK_OFF_MPS`], or its top speed if that is less.
+    #[must_use]
+    pub const fn back_off_mps(&self) -> f64 {
+        BACK_OFF_MPS.min(self.max_speed_mps)
     }
 
     pub(crate) fn validate(&self) -> Result<(), RobotError> {

@@ -165,13 +165,12 @@ impl<S: Simulator> Vehicle<S> {
     pub fn back_off(&mut self, distance_m: f64) -> ActionReport {
         let noise = self.begin_action();
         let distance_m = if self.robot.recovery_reverse_m > 0.0 { distance_m } else { 0.0 };
+        let speed_mps = self.robot.back_off_mps();
         let command = match self.robot.drive {
-            Drive::Differential { .. } => {
-                WheelCommand::Twist { speed_mps: -BACK_OFF_MPS, yaw_rate_radps: 0.0 }
-            }
-            Drive::Ackermann { .. } => WheelCommand::Steer { speed_mps: -BACK_OFF_MPS, steer_rad: 0.0 },
+            Drive::Differential { .. } => WheelCommand::Twist { speed_mps: -speed_mps, yaw_rate_radps: 0.0 },
+            Drive::Ackermann { .. } => WheelCommand::Steer { speed_mps: -speed_mps, steer_rad: 0.0 },
         };
-        let time_max_s = 1.0 + 2.0 * distance_m / BACK_OFF_MPS;
+        let time_max_s = 1.0 + 2.0 * distance_m / speed_mps;
         let mut report = self.blank_report();
         let start = report.before.pose;
         while start.distance_m(&self.state().pose) < distance_m && report.time_s < time_max_s {

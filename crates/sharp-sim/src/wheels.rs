@@ -55,9 +55,10 @@ impl Wheels {
             Drive::Differential { wheelbase_m, .. } => {
                 let target = match command {
                     WheelCommand::Twist { yaw_rate_radps, .. } => yaw_rate_radps,
-                    WheelCommand::Steer { speed_mps, steer_rad } => {
+                    WheelCommand::Steer { speed_mps, steer_rad } if wheelbase_m > 0.0 => {
                         speed_mps * trig::tan(steer_rad) / wheelbase_m
                     }
+                    WheelCommand::Steer { .. } => 0.0,
                 };
                 let step = self.max_yaw_accel_radps2 * dt_s;
                 state.wheel_yaw_rate_radps = approach(state.wheel_yaw_rate_radps, target, step);

@@ -121,7 +121,8 @@ impl DistanceField {
 struct LowerEnvelope {
     heights: Vec<f32>,
     vertices: Vec<usize>,
-    bounds: Vec<f32>,
+    /// In double precision: squares of columns beyond 4,096 do not fit into single precision.
+    bounds: Vec<f64>,
 }
 
 impl LowerEnvelope {
@@ -139,12 +140,13 @@ impl LowerEnvelope {
         }
         let mut last = 0;
         self.vertices[0] = 0;
-        self.bounds[0] = f32::NEG_INFINITY;
+        self.bounds[0] = f64::NEG_INFINITY;
         for q in 1..len {
             loop {
                 let v = self.vertices[last];
-                let (qf, vf) = (q as f32, v as f32);
-                let meet = (self.heights[q] - self.heights[v] + qf * qf - vf * vf) / (2.0 * (qf - vf));
+                let (qf, vf) = (q as f64, v as f64);
+                let rise = f64::from(self.heights[q]) - f64::from(self.heights[v]);
+                let meet = 0.5 * (rise / (qf - vf) + qf + vf);
                 if meet <= self.bounds[last] && last > 0 {
                     last -= 1;
                     continue;
@@ -160,7 +162,7 @@ impl LowerEnvelope {
         let mut k = 0;
         for (col, value) in row.iter_mut().enumerate() {
             let q = (col + 1) as f32;
-            while k < last && self.bounds[k + 1] < q {
+            while k < last && self.bounds[k + 1] < f64::from(q) {
                 k += 1;
             }
             let d = q - self.vertices[k] as f32;

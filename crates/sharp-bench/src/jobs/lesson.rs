@@ -189,7 +189,7 @@ impl Lesson {
 
     fn settings(&self) -> Result<SolveSettings, BenchError> {
         let method = Method::by_name(&self.learning).ok_or_else(|| {
-            let problem = format!("{:?}, expected fast, paper or prior", self.learning);
+            let problem = format!("{:?}, expected fast, paper, paper-tuned or prior", self.learning);
             BenchError::Setting { setting: "learning", problem }
         })?;
         let Self { options, regions, metric, simulator, seed, .. } = self.clone();

@@ -131,7 +131,7 @@ impl Manifest {
     }
 
     /// Adds those of `works` that are not planned yet by the call `command`; returns the whole plan and the indices of
-    /// `works`.
+    /// `works`, each once.
     ///
     /// # Errors
     /// Returns an error if the manifest there is broken or cannot be written.
@@ -143,7 +143,14 @@ impl Manifest {
         let mut manifest =
             if path(dir).exists() { Self::open(dir)? } else { Self { dir: dir.to_owned(), jobs: vec![] } };
         let planned = manifest.jobs.len();
-        let indices = works.into_iter().map(|work| manifest.index_of(work.into(), command)).collect();
+        let mut indices: Vec<usize> = Vec::with_capacity(works.len());
+        for work in works {
+            let index = manifest.index_of(work.into(), command);
+            // Whoever names a thing twice wants it once.
+            if !indices.contains(&index) {
+                indices.push(index);
+            }
+        }
         if manifest.jobs.len() > planned {
             let text: String = manifest.jobs.iter().map(|job| to_json(job) + "\n").collect();
             write_atomic(&path(dir), text.as_bytes())?;

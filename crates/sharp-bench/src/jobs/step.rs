@@ -124,6 +124,9 @@ impl JobStep<'_> {
             sync(parent);
         } else if !folder.exists() {
             return named.map_err(|error| unwritable(&folder, &error));
+        } else if !folder.join("result.jsonl").exists() {
+            let problem = "has no result.jsonl; remove the folder, and the step is done again";
+            return Err(BenchError::Folder(format!("{}: {problem}", folder.display())));
         }
         Ok(())
     }

@@ -178,7 +178,7 @@ impl SuiteSelection {
         let learning: Vec<String> =
             if self.learning.is_empty() { own(self.suite.learning()) } else { self.learning.clone() };
         if let Some(unknown) = learning.iter().find(|name| Method::by_name(name).is_none()) {
-            let problem = format!("{unknown:?}, expected fast, paper or prior");
+            let problem = format!("{unknown:?}, expected fast, paper, paper-tuned or prior");
             return Err(BenchError::Setting { setting: "learning", problem });
         }
         let both = vec![OptionKind::Centroid, OptionKind::Interface];

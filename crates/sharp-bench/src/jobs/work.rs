@@ -153,7 +153,7 @@ impl JobTask<'_> {
         let monitor = TimedMonitor::new(Stopwatch::start("load"), Some(self.time_limit()), &stop);
         let problem = self.problem()?;
         let method = sharp.method().ok_or_else(|| {
-            let problem = format!("{:?}, expected fast, paper or prior", sharp.learning);
+            let problem = format!("{:?}, expected fast, paper, paper-tuned or prior", sharp.learning);
             BenchError::Setting { setting: "learning", problem }
         })?;
         let settings = SolveSettings {

@@ -16,7 +16,7 @@ use super::courses::PriorCourses;
 use super::recipe::{PriorRecipe, PriorStage};
 
 /// First word of a saved state; the number is the version of the format.
-const STATE_FORMAT: &str = "sharp.prior.state/1";
+const STATE_FORMAT: &str = "sharp.prior.state/2";
 
 /// Why no prior came out.
 #[derive(Debug, Error)]
@@ -71,13 +71,15 @@ pub struct PriorProgress<'a> {
     pub steps_before: u64,
     /// What the learner says; its steps are those of this stage.
     pub learner: &'a Progress<'a>,
+    /// The hash of robot, recipe and seed.
+    training: &'a str,
 }
 
 impl PriorProgress<'_> {
     /// The bytes from which the same training goes on.
     #[must_use]
     pub fn checkpoint(&self) -> Option<Vec<u8>> {
-        Some(saved(self.stage, &self.learner.checkpoint()?))
+        Some(saved((self.training, self.stage), &self.learner.checkpoint()?))
     }
 }
 
@@ -94,8 +96,12 @@ pub fn train_prior(
     on_map: &(dyn Fn() + Sync),
     observer: &mut dyn FnMut(&PriorProgress<'_>) -> ControlFlow<()>,
 ) -> Result<PriorEnd, PriorTrainError> {
+    let training = hash(format!("{robot:?} {recipe:?} {seed:?}").as_bytes());
     let (first, mut state) = match interrupted {
-        Some(bytes) => read_saved(bytes, recipe.stages.len()).map(|(stage, state)| (stage, Some(state)))?,
+        Some(bytes) => {
+            let (stage, state) = read_saved(bytes, (&training, recipe.stages.len()))?;
+            (stage, Some(state))
+        }
         None => (0, None),
     };
     let mut actor: Option<Actor> = None;
@@ -111,7 +117,7 @@ pub fn train_prior(
         let steps_before = before(index);
         let mut note = |progress: &Progress<'_>| {
             success = progress.recent_success_rate;
-            observer(&PriorProgress { stage: index, steps_before, learner: progress })
+            observer(&PriorProgress { stage: index, steps_before, learner: progress, training: &training })
         };
         let mut rng = seed.stream("ppo", 0);
         let (end, stop) = match (state.take(), actor.take()) {
@@ -150,21 +156,25 @@ fn batch(
     Some((DrivingBatch::new(Arc::new(scenarios), stage.slots, seed.child("environment", 0)), count))
 }
 
-/// A saved state: format, stage and hash in a line of text, then the learner's state.
-fn saved(stage: usize, state: &[u8]) -> Vec<u8> {
-    let mut bytes = format!("{STATE_FORMAT} {stage} {}\n", hash(state)).into_bytes();
+/// A saved state: format, hash of the training, stage and hash of the rest in a line of text, then the learner's state.
+fn saved((training, stage): (&str, usize), state: &[u8]) -> Vec<u8> {
+    let mut bytes = format!("{STATE_FORMAT} {training} {stage} {}\n", hash(state)).into_bytes();
     bytes.extend_from_slice(state);
     bytes
 }
 
-fn read_saved(bytes: &[u8], stages: usize) -> Result<(usize, PpoState), PriorTrainError> {
+fn read_saved(bytes: &[u8], (training, stages): (&str, usize)) -> Result<(usize, PpoState), PriorTrainError> {
     let broken = |what: &str| PriorTrainError::State(what.to_owned());
     let line = bytes.iter().position(|&byte| byte == b'\n').ok_or_else(|| broken("no first line"))?;
     let (head, state) = (String::from_utf8_lossy(&bytes[..line]), &bytes[line + 1..]);
     let words: Vec<&str> = head.split(' ').collect();
-    let [format, stage, sum] = words[..] else { return Err(broken("a first line of other words")) };
+    let format = words[0];
     if format != STATE_FORMAT {
         return Err(PriorTrainError::State(format!("format {format:?}, expected {STATE_FORMAT:?}")));
+    }
+    let [_, found, stage, sum] = words[..] else { return Err(broken("a first line of other words")) };
+    if found != training {
+        return Err(broken("another robot, recipe or seed"));
     }
     if sum != hash(state) {
         return Err(broken("the bytes do not have their hash"));
@@ -226,9 +236,12 @@ mod tests {
 
     #[test]
     fn a_damaged_state_is_refused() {
-        let refusal = |bytes: &[u8]| read_saved(bytes, 1).expect_err("damaged").to_string();
+        let refusal = |bytes: &[u8]| read_saved(bytes, ("here", 1)).expect_err("damaged").to_string();
+        let saved = |stage, state: &[u8]| saved(("here", stage), state);
         assert_eq!(refusal(b"sharp"), "saved state: no first line");
         assert!(refusal(b"sharp.prior.state/0 0 abc\n").contains("format"), "another version");
+        let other = super::saved(("there", 0), b"state");
+        assert_eq!(refusal(&other), "saved state: another robot, recipe or seed");
         let mut bytes = saved(0, b"state");
         bytes.push(b'!');
         assert_eq!(refusal(&bytes), "saved state: the bytes do not have their hash");

@@ -299,6 +299,7 @@ const fn end_name(end: EpisodeEnd) -> &'static str {
         EpisodeEnd::Collided => "collided",
         EpisodeEnd::TimedOut => "timed_out",
         EpisodeEnd::Lost => "lost",
+        EpisodeEnd::Stopped => "stopped",
     }
 }
 

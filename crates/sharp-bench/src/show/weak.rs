@@ -125,7 +125,7 @@ fn described(Failures { leg, end, places }: &Failures, is_first: bool, shown: &P
     let what = match end {
         EpisodeEnd::Collided => "touched a wall",
         EpisodeEnd::TimedOut => "ran out of time",
-        EpisodeEnd::Lost | EpisodeEnd::Reached => "lost its way",
+        EpisodeEnd::Lost | EpisodeEnd::Reached | EpisodeEnd::Stopped => "lost its way",
     };
     let drives = format!("{} of {} drives {what} near ({x}, {y})", places.len(), shown.recordings.len());
     let step = leg.map(|leg| steps(shown)[leg]);

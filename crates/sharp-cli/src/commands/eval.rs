@@ -53,7 +53,11 @@ pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
         say!("results in {}, plans and pictures in {}", show(args, "results.jsonl"), show(args, "jobs"));
         say!("report in {}", page.display());
     }
-    if merged.missing.iter().any(|(index, _)| indices.contains(index)) {
+    let missing: Vec<_> = merged.missing.iter().filter(|(index, _)| indices.contains(index)).collect();
+    if !missing.is_empty() {
+        for (_, error) in missing {
+            eprintln!("error: {error}");
+        }
         return Ok(Exit::Partial);
     }
     clean(&manifest);

@@ -29,7 +29,7 @@ pub(crate) fn run(command: &Library, json: bool) -> Result<Exit, Failure> {
         Library::List { dir } => (dir, false),
         Library::Check { dir } => (dir, true),
     };
-    let options = entries(dir)?;
+    let options = entries(dir, is_check)?;
     if json {
         say!("{}", to_json(&Report { schema: "sharp.library/1", options }));
     } else if is_check {
@@ -43,8 +43,8 @@ pub(crate) fn run(command: &Library, json: bool) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Opens every world of the library; a damaged file is an error that names it.
-fn entries(dir: &Path) -> Result<Vec<Entry>, Failure> {
+/// Opens every world of the library, for a check with its abstractions; a damaged file is an error that names it.
+fn entries(dir: &Path, is_check: bool) -> Result<Vec<Entry>, Failure> {
     let unreadable = |error| Failure::new("FILE_UNREADABLE", format!("{}: {error}", dir.display()));
     let mut worlds: Vec<String> = std::fs::read_dir(dir)
         .map_err(unreadable)?
@@ -56,6 +56,9 @@ fn entries(dir: &Path) -> Result<Vec<Entry>, Failure> {
     let mut entries = Vec::new();
     for world in worlds {
         let library = OptionLibrary::open(dir, &world)?;
+        if is_check {
+            OptionLibrary::check_abstractions(dir, &world)?;
+        }
         entries.extend(library.iter().map(|(id, stored)| Entry {
             world: world.clone(),
             option: id.to_string(),

@@ -5,13 +5,13 @@ use std::path::Path;
 use clap::Command;
 use sharp_plan::write_atomic;
 
-use crate::outcome::{Exit, Failure, say};
+use crate::outcome::{Exit, Failure, say, say_bytes};
 
 /// Writes a page for `command` and for each command below it into the folder `out`, or prints the first of them.
 pub(crate) fn run(mut command: Command, out: Option<&Path>, json: bool) -> Result<Exit, Failure> {
     command.build();
     let Some(out) = out else {
-        print!("{}", String::from_utf8_lossy(&page(&command)?));
+        say_bytes(&page(&command)?);
         return Ok(Exit::Done);
     };
     let mut names = Vec::new();

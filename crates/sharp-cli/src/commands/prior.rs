@@ -175,7 +175,9 @@ impl TrainWatch<'_> {
 
 /// Where a run that was interrupted goes on.
 fn checkpoint(args: &PriorTrain) -> PathBuf {
-    args.out.with_extension("state")
+    let mut name = args.out.clone().into_os_string();
+    name.push(".state");
+    name.into()
 }
 
 /// The bytes of `path`, or `None` if there is no such file.

@@ -88,16 +88,24 @@ impl OptionLearner for Selection {
         monitor: &dyn LearningMonitor,
     ) -> Result<Option<LearntPolicy>, LearnFailure> {
         let chosen = self.choose(task, Some(beaten), monitor)?;
-        let most = chosen.as_ref().map_or(beaten, |(judged, _)| judged.count);
+        let most = chosen.as_ref().map(|(judged, _)| judged.count);
+        let most = most.filter(|count| count.successes > beaten.successes).unwrap_or(beaten);
         let mut effort = (0, 0);
         // What a first choice lacks the plan may not need: training takes longer than all the rest.
         if may_train && most.rate() < self.train_below {
-            let trained = self.train_prior(task, monitor)?;
-            let judged = if task.tail.is_empty() { trained.estimate } else { task.judge(&trained.policy) };
-            if judged.count.successes > most.successes {
-                return Ok(Some(trained));
+            match self.train_prior(task, monitor) {
+                Ok(trained) => {
+                    let is_judged = task.tail.is_empty();
+                    let judged = if is_judged { trained.estimate } else { task.judge(&trained.policy) };
+                    if judged.count.successes > most.successes {
+                        return Ok(Some(trained));
+                    }
+                    effort = (trained.env_steps, trained.gradient_steps);
+                }
+                // What was chosen holds though a training went wrong.
+                Err(LearnFailure::Broken(_)) => {}
+                Err(failure) => return Err(failure),
             }
-            effort = (trained.env_steps, trained.gradient_steps);
         }
         Ok(chosen.map(|(judged, policy)| {
             let estimate = task.estimate_alone(&policy, judged);
@@ -116,7 +124,8 @@ impl OptionLearner for Selection {
 }
 
 impl Selection {
-    /// The cheapest of the prior and the fallbacks; `None` if nothing succeeds more often than `beaten`.
+    /// The cheapest of the prior and the fallbacks; `None` if nothing succeeds more often than `beaten`, or as often as is
+    /// wanted.
     fn choose(
         &self,
         task: &LearningTask<'_>,
@@ -165,9 +174,13 @@ impl Selection {
         let robot = &task.world.robot;
         let reward = ProgressReward { contact: FINE_CONTACT, ..ProgressReward::default() };
         let actor = task.world.prior().actor().clone();
-        let networks = SacState::with_actor(actor, &self.train.sac, &mut task.seed.stream("critics", 0));
+        let mut train = self.train.clone();
+        // A prior of somebody's own may be wider than the shipped ones.
+        let sizes = actor.network().sizes();
+        train.sac.hidden = sizes[1..sizes.len() - 1].to_vec();
+        let networks = SacState::with_actor(actor, &train.sac, &mut task.seed.stream("critics", 0));
         let start = SacStart::Networks(Box::new(networks));
-        let learner = SacLearner::new(self.train.clone()).with_start(start);
+        let learner = SacLearner::new(train).with_start(start);
         let training = NetworkTraining {
             interface: prior_interface(robot, PolicyContext::new(&task.conditions.noise, 1.0)),
             reward: Arc::new(reward),

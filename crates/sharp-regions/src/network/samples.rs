@@ -4,6 +4,7 @@
 //! checksum of its tensors; a file whose recipe or checksum does not match is made again.
 
 use std::collections::HashMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
@@ -169,8 +170,10 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), DatasetError>
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(failed("create the folder of"))?;
     }
-    let partial = path.with_extension("partial");
-    std::fs::write(&partial, bytes).map_err(failed("write"))?;
+    // Two processes that write the same file do not write into one another's.
+    let partial = path.with_extension(format!("{}.partial", std::process::id()));
+    let mut file = std::fs::File::create(&partial).map_err(failed("write"))?;
+    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(failed("write"))?;
     std::fs::rename(&partial, path).map_err(failed("rename"))
 }
 

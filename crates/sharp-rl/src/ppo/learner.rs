@@ -92,6 +92,10 @@ impl Learner for PpoLearner {
             if is_due {
                 evaluated_at = run.state.env_steps;
                 let (evaluation, is_met) = self.judge(&run, &mut evaluation_rng)?;
+                // Whoever meets the rule is what was asked for.
+                if is_met {
+                    best = None;
+                }
                 keep(&mut best, &run, evaluation);
                 (found, reached) = (Some(evaluation), is_met);
             }
