@@ -176,13 +176,13 @@ impl<'a> LegChain<'a> {
             part.start == run.start || turn_rad <= JOINT_TURN_MAX_RAD
         };
         let mut drafts = Drafts::default();
-        let mut sound = |robot: &GuideRobot<'a>| {
+        let sound = |robot: &GuideRobot<'a>| {
             let mut paths =
                 (0..ATTEMPTS).filter_map(|number| self.draft(part, ends, robot, number, &mut drafts));
             paths.find(|draft| draft.faults_m.is_empty() && is_straight(&draft.path))
         };
         let mut fitting = robots.iter().filter(|robot| fits(robot, gap_m));
-        fitting.find_map(|robot| sound(robot)).map(|draft| draft.pieces)
+        fitting.find_map(sound).map(|draft| draft.pieces)
     }
 
     /// The guides of the options of `run` behind one another, from one end to the other.
