@@ -265,7 +265,7 @@ impl GuidedOption {
             let target = u8::from(self.target.contains(point, states));
             bytes.push(grid.get(cell) as u8 | allowed << 2 | u8::from(is_source) << 4 | target << 5);
         }
-        // What few options have comes last, so that all others are called as ever.
+        // Only few options have these; the hashes of all others stay as they were.
         if let Some((heading, tolerance_rad)) = self.target.goal().and_then(|goal| goal.heading) {
             bytes.extend([heading.radians(), tolerance_rad].into_iter().flat_map(f64::to_le_bytes));
         }

@@ -108,7 +108,7 @@ impl Reading {
             state.velocity = Vector::new(speed_mps, 0.0);
         }
         state.yaw_rate_radps = self.yaw_rate_radps.unwrap_or(state.yaw_rate_radps);
-        // Nobody tells how the wheels roll: as the body moves.
+        // A reading does not say how the wheels roll; take the motion of the body.
         state.wheel_speed_mps = state.velocity.x;
         match robot.drive {
             Drive::Differential { .. } => state.wheel_yaw_rate_radps = state.yaw_rate_radps,
@@ -173,7 +173,7 @@ impl RemoteDriver {
         }
         match self.pending {
             Pending::Nothing => {}
-            // Somebody may have moved it meanwhile.
+            // The robot may have been moved meanwhile.
             Pending::Stand => self.policy.observe(&stood(state)),
             Pending::Command(command) => self.policy.observe(&Motion::commanded(command, state)),
             Pending::BackOff { from, distance_m, actions } => {

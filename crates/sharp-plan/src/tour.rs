@@ -72,7 +72,7 @@ impl Tour {
     #[must_use]
     pub fn verified(plans: Vec<Arc<Plan>>, simulator: &dyn Simulator) -> Self {
         let first = plans.first().expect("a tour has a plan");
-        // Nobody knows how plans that were not run hang together: their tour is run all the same.
+        // Plans that were not run say nothing of the hand-overs between them, so the tour is run.
         let episodes = match first.method.verify_episodes {
             0 => VERIFIED_MAX,
             wanted => wanted.min(VERIFIED_MAX),

@@ -146,7 +146,7 @@ impl Manifest {
         let mut indices: Vec<usize> = Vec::with_capacity(works.len());
         for work in works {
             let index = manifest.index_of(work.into(), command);
-            // Whoever names a thing twice wants it once.
+            // A value may be given twice in a list.
             if !indices.contains(&index) {
                 indices.push(index);
             }

@@ -102,7 +102,7 @@ impl OptionLearner for Selection {
                     }
                     effort = (trained.env_steps, trained.gradient_steps);
                 }
-                // What was chosen holds though a training went wrong.
+                // The chosen policy is kept if a training went wrong.
                 Err(LearnFailure::Broken(_)) => {}
                 Err(failure) => return Err(failure),
             }

@@ -92,7 +92,7 @@ impl Learner for PpoLearner {
             if is_due {
                 evaluated_at = run.state.env_steps;
                 let (evaluation, is_met) = self.judge(&run, &mut evaluation_rng)?;
-                // Whoever meets the rule is what was asked for.
+                // The policy that met the rule is the result.
                 if is_met {
                     best = None;
                 }
