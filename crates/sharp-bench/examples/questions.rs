@@ -168,7 +168,7 @@ fn compare(
     let (mut error, mut sums, mut cold) = (0.0, [0.0; 4], [0.0; 3]);
     let tells_each = std::env::var_os("SLOW").is_some();
     for (index, plan) in plans.iter().enumerate() {
-        let odds = plan.solution.composed.clone().expect("nothing was run");
+        let odds = plan.solution.odds();
         let plan = Arc::new((**plan).clone());
         let (count, time_s) = executed(&plan, Seed(seed).child("plan", index as u64));
         let measured = count.rate();

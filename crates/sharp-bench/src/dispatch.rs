@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use sharp_plan::{
-    AbstractionFile, Answer, Instruction, Plan, Query, Reading, RemoteDriver, RemoteStatus, Sharp, end_of,
+    AbstractionFile, Answer, ComposedOdds, Instruction, Plan, Query, Reading, RemoteDriver, RemoteStatus,
+    Sharp, end_of,
 };
 use sharp_sim::RobotState;
 use sharp_space::{Occupancy, Pose};
@@ -77,6 +78,7 @@ pub struct Dispatcher {
 struct Driving {
     driver: RemoteDriver,
     plan: Arc<Plan>,
+    odds: ComposedOdds,
 }
 
 impl Dispatcher {
@@ -215,17 +217,14 @@ impl Dispatcher {
     /// The line that tells the robot `told`.
     fn reply(&self, told: &Instruction, status: &'static str) -> DispatchLine {
         let Some(driving) = &self.driving else { return standing(self.rest) };
-        let here = driving.plan.solution.composed.as_ref().map(|odds| odds.rest(driving.driver.progress()));
-        let odds = here.map(|(success, time_s)| {
-            let later = self.later.iter();
-            later.fold(Odds { success, time_s }, |sum, next| Odds {
-                success: sum.success * next.success,
-                time_s: sum.time_s + next.time_s,
-            })
+        let (success, time_s) = driving.odds.rest(driving.driver.progress());
+        let odds = self.later.iter().fold(Odds { success, time_s }, |sum, next| Odds {
+            success: sum.success * next.success,
+            time_s: sum.time_s + next.time_s,
         });
         let waypoint = told.waypoint.map(|pose| [pose.position.x, pose.position.y, pose.heading.radians()]);
         let (speed, option) = (told.speed_mps, told.option.to_string());
-        DispatchLine::Reply(DispatchReply { waypoint, speed, option, status, odds })
+        DispatchLine::Reply(DispatchReply { waypoint, speed, option, status, odds: Some(odds) })
     }
 
     /// Returns true if a robot can be at `pose`: its middle is in the free space of the map.
@@ -237,16 +236,13 @@ impl Dispatcher {
 
 impl Driving {
     fn new(plan: Plan, state: RobotState) -> Self {
-        let plan = Arc::new(plan);
-        Self { driver: RemoteDriver::from_state(vec![Arc::clone(&plan)], state, true), plan }
+        let (odds, plan) = (plan.solution.odds(), Arc::new(plan));
+        Self { driver: RemoteDriver::from_state(vec![Arc::clone(&plan)], state, true), plan, odds }
     }
 }
 
 fn odds(plan: &Plan) -> Odds {
-    let (success, time_s) = match &plan.solution.composed {
-        Some(odds) => (odds.success, odds.time_s),
-        None => (plan.solution.predicted.rate(), plan.solution.predicted_time_s),
-    };
+    let ComposedOdds { success, time_s, .. } = plan.solution.odds();
     Odds { success, time_s }
 }
 

@@ -35,7 +35,8 @@ const COMPOSED_MAX: usize = 2;
 const COMPOSED_WELL: [f64; 2] = [0.95, 0.98];
 /// And only if start and goal are no further apart, metres: the guide of a longer way takes longer than the rest of an answer.
 const COMPOSED_DIRECT_M: f64 = 25.0;
-
+/// A composed plan that succeeds less often than this is compared with one that the usual method makes and runs.
+const COMPOSED_USABLE: f64 = 0.9;
 /// Composed plans that are longer than this many times the shortest way are compared with the direct way too.
 const DETOUR: f64 = 1.35;
 
@@ -77,13 +78,16 @@ pub(crate) fn solve_with(
     library: &mut OptionLibrary,
     known: &Arc<KnownOptions>,
 ) -> Result<Outcome, FileError> {
-    let mut outcome = algorithm_1(problem, abstraction, library, known);
+    let mut outcome = algorithm_1(problem, abstraction, Policies::new(library), known);
+    if let Ok(Outcome::Solved(solution)) = &mut outcome {
+        verify_poor(problem, abstraction, Policies::leaving(library), known, solution)?;
+    }
     if let Ok(Outcome::NoPlan(_)) = outcome {
         let gap = narrowest_gap(problem.world, &problem.query);
         // What quick guides cannot reach may be reached by manoeuvring, unless the robot does not fit.
         if let Some(method) = problem.method.patient().filter(|_| fits(problem.world, gap.as_ref())) {
             let patient = PlanningProblem { method: &method, ..*problem };
-            outcome = algorithm_1(&patient, abstraction, library, known);
+            outcome = algorithm_1(&patient, abstraction, Policies::new(library), known);
         }
         if let Ok(Outcome::NoPlan(reason)) = &mut outcome {
             *reason = describe(problem, gap.as_ref(), reason);
@@ -94,11 +98,35 @@ pub(crate) fn solve_with(
     outcome
 }
 
+/// Puts the plan of the usual method in the place of a composed `solution` that promises little, if it costs less.
+fn verify_poor(
+    problem: &PlanningProblem<'_>,
+    abstraction: &Abstraction,
+    policies: Policies<'_>,
+    known: &Arc<KnownOptions>,
+    solution: &mut Box<Solution>,
+) -> Result<(), FileError> {
+    let failure_cost_s = problem.method.failure_cost_s;
+    let Some(method) = problem.method.usual.as_deref().filter(|_| solution.success() < COMPOSED_USABLE)
+    else {
+        return Ok(());
+    };
+    // Repairs are for this problem alone: an option of the library that changed would no longer be the one whose hand-overs
+    // were driven, and the answer to a question would depend on those before it.
+    let usual = PlanningProblem { method, ..*problem };
+    if let Outcome::Solved(other) = algorithm_1(&usual, abstraction, policies, known)?
+        && other.cost_s(failure_cost_s) < solution.cost_s(failure_cost_s)
+    {
+        *solution = other;
+    }
+    Ok(())
+}
+
 /// The algorithm itself, at most 60 lines.
 fn algorithm_1(
     problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
-    library: &mut OptionLibrary,
+    mut policies: Policies<'_>,
     known: &Arc<KnownOptions>,
 ) -> Result<Outcome, FileError> {
     let PlanningProblem { world, method, conditions, query, seed, monitor } = *problem;
@@ -112,7 +140,6 @@ fn algorithm_1(
         }
         Err(unplaced) => return Ok(Outcome::NoPlan(unplaced.to_string())),
     };
-    let mut policies = Policies::new(library);
     let mut most = if method.verify_episodes == 0 { COMPOSED_MAX } else { VERIFIED_MAX };
     let mut best: Option<Solution> = None;
     let (mut chosen, mut measured): (_, Vec<Vec<LegId>>) = (vec![], vec![]);

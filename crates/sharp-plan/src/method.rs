@@ -73,6 +73,8 @@ pub struct Method {
     pub verify_episodes: u32,
     /// Half the width of the 95 % interval of the predicted success at which counting ends earlier; 0 for never.
     pub verify_half_width: f64,
+    /// For a method that composes its odds: the one that is asked where they are poor.
+    pub usual: Option<Arc<Self>>,
 }
 
 /// In which order the options of a plan are learnt.
@@ -270,6 +272,7 @@ impl Method {
             repair: RepairSettings { rounds: 0, episodes: 1000, wanted_success: 0.99, judge_episodes: 500 },
             verify_episodes: 1000,
             verify_half_width: 0.01,
+            usual: None,
         }
     }
 
@@ -297,12 +300,16 @@ impl Method {
     }
 
     /// The same for questions to a building that was learnt: odds are composed of what the library knows, nothing is run
-    /// from end to end or repaired, and few guides are planned.
+    /// from end to end or repaired, and few guides are planned. Only where the odds are poor is this method asked as well.
     #[must_use]
     pub fn composed(self) -> Self {
         let guide = self.search.guide.unsampled();
         let search = SearchSettings { direct_routes: 1, unguided_speed: UNGUIDED_SPEED, ..self.search };
-        Self { verify_episodes: 0, search, ..self }.with_guides(guide)
+        // A repair takes ten seconds and more, and is for this plan alone.
+        let repair = RepairSettings { rounds: 0, ..self.repair };
+        let usual = (self.verify_episodes > 0 && !self.keeps_all())
+            .then(|| Arc::new(Self { repair, ..self.clone() }));
+        Self { verify_episodes: 0, search, usual, ..self }.with_guides(guide)
     }
 
     /// Whether a plan is kept even if it rarely succeeds: the paper's rule.

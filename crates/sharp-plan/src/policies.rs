@@ -17,6 +17,8 @@ const TRAININGS_MAX: u32 = 3;
 #[derive(Debug)]
 pub(crate) struct Policies<'a> {
     library: &'a mut OptionLibrary,
+    /// Whether the library gets what is learnt.
+    adds: bool,
     /// Legs that only this problem has, and options that changed in it.
     learnt: BTreeMap<LegId, LearntPolicy>,
     /// Options that had no policy before this problem.
@@ -26,7 +28,12 @@ pub(crate) struct Policies<'a> {
 impl<'a> Policies<'a> {
     /// The policies of `library`.
     pub(crate) const fn new(library: &'a mut OptionLibrary) -> Self {
-        Self { library, learnt: BTreeMap::new(), fresh: BTreeSet::new() }
+        Self { library, adds: true, learnt: BTreeMap::new(), fresh: BTreeSet::new() }
+    }
+
+    /// The same for a problem that leaves the library as it is.
+    pub(crate) fn leaving(library: &'a mut OptionLibrary) -> Self {
+        Self { adds: false, ..Self::new(library) }
     }
 
     /// The policy of the leg called `id`. One that was trained without a single success is none while it may be trained again.
@@ -97,7 +104,7 @@ impl<'a> Policies<'a> {
         }
         // A failed training is kept too: the next one has another seed.
         let is_worth_keeping = learnt.estimate.count.successes > 0 || learnt.training.is_some();
-        if let (LegId::Option(id), true) = (option.id, is_worth_keeping) {
+        if let (LegId::Option(id), true) = (option.id, self.adds && is_worth_keeping) {
             let corridor = corridor(option, grid);
             let stored = StoredOption { guide: option.guide.clone(), learnt: learnt.clone(), corridor };
             self.library.insert(id, stored)?;

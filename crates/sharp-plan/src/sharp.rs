@@ -331,4 +331,24 @@ mod tests {
         let time_s = executions.iter().map(|one| one.record.time_s).sum::<f64>() / n;
         assert!((odds.time_s / time_s - 1.0).abs() < 0.1, "{} s predicted, {time_s} s measured", odds.time_s);
     }
+    #[test]
+    fn a_composed_plan_with_poor_odds_gives_way_to_one_that_was_run_and_the_library_stays() {
+        let composed = Method::fast().composed();
+        let hurried = Method { usual: None, ..composed.clone() };
+        let query = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
+        let mut sharp = ring().with_noise(NoiseModel::nominal().scaled(5.0)).with_method(hurried);
+        let Answer::Solved(poor) = sharp.solve(query, &()).expect("in memory") else { panic!("a ring") };
+        assert!(poor.solution.success() < 0.9, "{:?}", poor.solution.odds());
+        let before = sharp.library().version();
+        let mut sharp = sharp.with_method(composed);
+        let Answer::Solved(plan) = sharp.solve(query, &()).expect("in memory") else { panic!("a ring") };
+        let solution = &plan.solution;
+        assert!(solution.composed.is_none(), "it was run: {:?}", solution.predicted);
+        assert_eq!(sharp.library().version(), before, "other answers stay as they are");
+        let odds = solution.odds();
+        assert!((odds.success - solution.success()).abs() < 1e-9, "{odds:?}");
+        assert!((odds.time_s / solution.predicted_time_s - 1.0).abs() < 0.1, "{odds:?}");
+        let cost_s = |plan: &Plan| plan.solution.cost_s(plan.method.failure_cost_s);
+        assert!(cost_s(&plan) < cost_s(&poor));
+    }
 }

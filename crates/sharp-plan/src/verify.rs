@@ -64,6 +64,20 @@ impl Solution {
         self.composed.as_ref().map_or_else(|| self.predicted.rate(), |odds| odds.success)
     }
 
+    /// The odds of the plan by its pieces: as they were composed, or by the runs of its legs.
+    #[must_use]
+    pub fn odds(&self) -> ComposedOdds {
+        let piece = |(index, step): (usize, &PlannedOption)| PlanPiece {
+            until: index as f64 + 1.0,
+            success: step.on_arrival.rate(),
+            episodes: f64::from(step.on_arrival.episodes),
+            time_s: if step.arrival_time_s.is_finite() { step.arrival_time_s } else { 0.0 },
+            runs: step.on_arrival.episodes,
+        };
+        let by_runs = || ComposedOdds::of(self.steps.iter().enumerate().map(piece).collect());
+        self.composed.clone().unwrap_or_else(by_runs)
+    }
+
     /// What a use of the plan is expected to cost, seconds. One failure in a few hundred runs would decide between two plans:
     /// the chance of failure is the mean of what may be after the runs (Jeffreys' rule), not their share.
     pub(crate) fn cost_s(&self, failure_cost_s: f64) -> f64 {

@@ -140,6 +140,7 @@ fn method(args: &Solve) -> Result<Method, Failure> {
     method.search.cost_update = args.cost_update == Switch::On;
     method.failure_cost_s = args.failure_cost.unwrap_or(method.failure_cost_s);
     method.search.goal_heading_tolerance_rad = heading_tolerance(args)?;
+    let mut is_composed = false;
     if args.verify != "auto" {
         let episodes = args.verify.parse().ok().filter(|episodes| (0..=EPISODES_MAX).contains(episodes));
         let usage = || {
@@ -147,10 +148,14 @@ fn method(args: &Solve) -> Result<Method, Failure> {
                 format!("--verify is {:?}, expected auto or a number from 0 to {EPISODES_MAX}", args.verify);
             Failure::new("USAGE", message)
         };
-        (method.verify_episodes, method.verify_half_width) = (episodes.ok_or_else(usage)?, 0.0);
+        let episodes = episodes.ok_or_else(usage)?;
+        is_composed = episodes == 0;
+        if !is_composed {
+            (method.verify_episodes, method.verify_half_width) = (episodes, 0.0);
+        }
     }
     let method = if args.guide == Guide::Paper { method.with_learn_and_link() } else { method };
-    Ok(if method.verify_episodes == 0 { method.composed() } else { method })
+    Ok(if is_composed { method.composed() } else { method })
 }
 
 /// How far off the goal's heading the robot may stand, radians; `None` where any will do.
