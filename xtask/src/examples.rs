@@ -10,7 +10,8 @@ use crate::process::{cargo, exit_code};
 use crate::tree;
 
 /// Examples that need arguments, by the beginning of their names. The peers drive other programs for comparison.
-const WITH_ARGUMENTS: [&str; 5] = ["peer_", "draw_regions", "questions", "paper_", "yardstick"];
+const WITH_ARGUMENTS: [&str; 6] =
+    ["peer_", "draw_regions", "questions", "random_problems", "paper_", "yardstick"];
 
 /// Builds the examples of all crates as `cargo test` does, and runs them one after the other.
 ///

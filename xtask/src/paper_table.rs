@@ -114,13 +114,21 @@ impl PaperTable {
                 let running: Vec<_> = together.iter().map(begin).collect();
                 running.into_iter().map(|one| one.join().expect("no panic")).collect()
             });
+            let mut failure = Ok(());
             for result in results {
-                let Some(line) = result? else { continue };
-                keep(&line)?;
-                self.site.note(&NamedRow(&line))?;
-                eprintln!("{}", summary(&line));
-                left -= 1;
+                match result {
+                    Ok(Some(line)) => {
+                        keep(&line)?;
+                        self.site.note(&NamedRow(&line))?;
+                        eprintln!("{}", summary(&line));
+                        left -= 1;
+                    }
+                    Ok(None) => {}
+                    // The others are kept first: each may have taken forty minutes.
+                    Err(error) => failure = Err(error),
+                }
             }
+            failure?;
             self.write()?;
         }
         Ok(if left == 0 { 0 } else { 3 })

@@ -19,7 +19,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use rand::RngExt;
 use sharp_bench::{AbstractionRequest, NamedWorld, SolveSettings, Stopwatch, TimedMonitor};
 use sharp_drive::SuccessCount;
 use sharp_maps::{LoadOptions, load};
@@ -27,7 +26,7 @@ use sharp_options::OptionKind;
 use sharp_plan::{Answer, Method, Plan, Query, RunSettings, run, success};
 use sharp_rbvd::CellMetric;
 use sharp_sim::SimulatorKind;
-use sharp_space::{CollisionChecker, Pose, Seed};
+use sharp_space::Seed;
 
 /// Executions that a prediction is compared with.
 const EXECUTIONS: u32 = 1000;
@@ -57,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         sharp.library().len(),
         began.elapsed().as_secs_f64()
     );
-    let asked = random_queries(&place, questions, seed);
+    let asked = place.random_queries(questions, Seed(seed));
     // The first question makes what all others share.
     let first = Instant::now();
     sharp.solve(asked[0], &())?;
@@ -129,31 +128,6 @@ fn cpu_ms() -> f64 {
         text.split_whitespace().next()?.parse::<f64>().ok()
     };
     tasks.filter_map(spent).sum::<f64>() / 1e6
-}
-
-/// Starts and goals with room all around, at least a fifth of the map's side (at least 8 m) apart.
-fn random_queries(place: &NamedWorld, count: usize, seed: u64) -> Vec<Query> {
-    let world = &place.world;
-    let bounds = world.grid.frame().bounds();
-    let side_m = world.grid.frame().width_m().max(world.grid.frame().height_m());
-    let least_m = if side_m > 40.0 { 30.0 } else { 8.0 };
-    let mut rng = Seed(seed).stream("questions", 0);
-    let mut queries = Vec::new();
-    while queries.len() < count {
-        let mut pose = || {
-            let x = rng.random_range(bounds.min.x..bounds.max.x);
-            let y = rng.random_range(bounds.min.y..bounds.max.y);
-            Pose::new(x, y, rng.random_range(-std::f64::consts::PI..std::f64::consts::PI))
-        };
-        let query = Query { start: pose(), goal: pose() };
-        let is_far = query.start.distance_m(&query.goal) >= least_m;
-        // What is wrong with an end takes long to say.
-        let is_free = |pose: &Pose| world.geometry.is_free(*pose);
-        if is_far && is_free(&query.start) && is_free(&query.goal) && query.check(world).is_ok() {
-            queries.push(query);
-        }
-    }
-    queries
 }
 
 /// Holds `plans` against executions and against plans that know no library.

@@ -14,7 +14,6 @@ use sharp_space::{Occupancy, Pose};
 
 use crate::error::BenchError;
 use crate::learn::NamedWorld;
-use crate::named::NamedProblem;
 use crate::reports::SolveReport;
 use crate::solve::{SolveSettings, answered, blank_report};
 use crate::stopwatch::{Stopwatch, TimedMonitor};
@@ -72,13 +71,24 @@ pub struct Dispatcher {
     driving: Option<Driving>,
     /// How the last drive ended, until there is a new goal.
     rest: &'static str,
+    /// Where no plan led on to the next goal.
+    lost_at: Option<Pose>,
+    /// New plans on the way since the robot was last at another place, and where that began.
+    recoveries: (u32, Pose),
 }
+
+/// A lost robot that moved or turned more than this may have a plan again, metres and radians.
+const MOVED: (f64, f64) = (0.05, 0.1);
+/// So many new plans without leaving a place of this size leave a robot lost, metres and radians.
+const RECOVERIES_MAX: u32 = 10;
+const STUCK_WITHIN: (f64, f64) = (0.2, 0.8);
 
 #[derive(Debug)]
 struct Driving {
     driver: RemoteDriver,
     plan: Arc<Plan>,
-    odds: ComposedOdds,
+    /// `None` where the driver has made a plan of its own.
+    odds: Option<ComposedOdds>,
 }
 
 impl Dispatcher {
@@ -89,7 +99,19 @@ impl Dispatcher {
     pub fn new(place: NamedWorld, settings: SolveSettings, library: &Path) -> Result<Self, BenchError> {
         let (sharp, file) = place.open(&settings, Some(library))?;
         let (to_come, later) = (VecDeque::new(), VecDeque::new());
-        Ok(Self { place, settings, sharp, file, state: None, to_come, later, driving: None, rest: "no_plan" })
+        Ok(Self {
+            place,
+            settings,
+            sharp,
+            file,
+            state: None,
+            to_come,
+            later,
+            driving: None,
+            rest: "no_plan",
+            lost_at: None,
+            recoveries: (0, Pose::new(0.0, 0.0, 0.0)),
+        })
     }
 
     /// The robot's state as it was last told.
@@ -122,7 +144,8 @@ impl Dispatcher {
     pub fn cancel(&mut self) {
         self.to_come.clear();
         self.later.clear();
-        (self.driving, self.rest) = (None, "no_plan");
+        (self.driving, self.rest, self.lost_at) = (None, "no_plan", None);
+        self.recoveries.0 = 0;
     }
 
     /// What to do for a robot that tells `reading`.
@@ -137,7 +160,9 @@ impl Dispatcher {
         }
         self.state = Some(state);
         let mut lines = Vec::new();
-        if self.driving.is_none() && !self.to_come.is_empty() {
+        if self.driving.is_none() && self.lost_at.is_some() {
+            self.set_out(state)?;
+        } else if self.driving.is_none() && !self.to_come.is_empty() {
             lines = self.plan_route(state)?;
         }
         lines.push(self.instruct(state)?);
@@ -168,9 +193,25 @@ impl Dispatcher {
         Ok(lines)
     }
 
+    /// Plans from `state` to the next goal and sets out; returns false where no plan leads there. Then the robot is lost, and
+    /// keeps its goals: from elsewhere there may be one.
+    fn set_out(&mut self, state: RobotState) -> Result<bool, BenchError> {
+        let may_have_way = self.lost_at.is_none_or(|at| is_elsewhere(&at, &state.pose, MOVED));
+        let goal = self.to_come.front().copied().filter(|_| may_have_way);
+        let Some(goal) = goal else { return Ok(false) };
+        let (_, plan) = self.ask(Query { start: state.pose, goal })?;
+        match plan {
+            Some(plan) => {
+                self.to_come.pop_front();
+                (self.driving, self.lost_at) = (Some(Driving::new(plan, state)), None);
+            }
+            None => (self.rest, self.lost_at) = ("lost", Some(state.pose)),
+        }
+        Ok(self.driving.is_some())
+    }
+
     fn ask(&mut self, query: Query) -> Result<(SolveReport, Option<Plan>), BenchError> {
-        let NamedWorld { map, world, noise, noise_model, .. } = self.place.clone();
-        let problem = NamedProblem { map, world, query, noise, noise_model };
+        let problem = self.place.problem(query);
         let monitor = TimedMonitor::new(Stopwatch::start("load"), None, &());
         let report = blank_report(&problem, &self.settings, &mut self.sharp, &self.file)?;
         let answer = match query.check(&problem.world) {
@@ -188,28 +229,36 @@ impl Dispatcher {
             match told.status {
                 RemoteStatus::Running => return Ok(self.reply(&told, "running")),
                 RemoteStatus::Recovering => {
-                    // The library knows more than the plan: a new one from here, by its odds.
                     let goal = driving.plan.solution.query.goal;
+                    self.recoveries = match self.recoveries {
+                        (count, at) if !is_elsewhere(&at, &state.pose, STUCK_WITHIN) => (count + 1, at),
+                        _ => (1, state.pose),
+                    };
+                    if self.recoveries.0 > RECOVERIES_MAX {
+                        self.to_come.push_front(goal);
+                        (self.driving, self.rest, self.lost_at) = (None, "lost", Some(state.pose));
+                        continue;
+                    }
+                    // The library knows more than the plan: a new one from here, by its odds.
                     let (_, plan) = self.ask(Query { start: state.pose, goal })?;
-                    let Some(plan) = plan else { return Ok(self.reply(&told, "recovering")) };
+                    let Some(plan) = plan else {
+                        // The driver's own new plan has no odds.
+                        self.driving.iter_mut().for_each(|driving| driving.odds = None);
+                        return Ok(self.reply(&told, "recovering"));
+                    };
                     let driving = self.driving.insert(Driving::new(plan, state));
                     let told = driving.driver.answer_in(state);
                     return Ok(self.reply(&told, "recovering"));
                 }
                 RemoteStatus::Reached => {
-                    let next = self.to_come.pop_front();
                     self.later.pop_front();
                     (self.driving, self.rest) = (None, "reached");
-                    let Some(goal) = next else { continue };
-                    match self.ask(Query { start: state.pose, goal })? {
-                        (_, Some(plan)) => self.driving = Some(Driving::new(plan, state)),
-                        (_, None) => self.cancel(),
+                    if !self.to_come.is_empty() && !self.set_out(state)? {
+                        return Ok(standing(self.rest));
                     }
                 }
-                RemoteStatus::Lost => {
-                    self.cancel();
-                    self.rest = "lost";
-                }
+                // The driver finds a way again once the robot stands elsewhere.
+                RemoteStatus::Lost => return Ok(standing("lost")),
             }
         }
     }
@@ -217,14 +266,17 @@ impl Dispatcher {
     /// The line that tells the robot `told`.
     fn reply(&self, told: &Instruction, status: &'static str) -> DispatchLine {
         let Some(driving) = &self.driving else { return standing(self.rest) };
-        let (success, time_s) = driving.odds.rest(driving.driver.progress());
-        let odds = self.later.iter().fold(Odds { success, time_s }, |sum, next| Odds {
-            success: sum.success * next.success,
-            time_s: sum.time_s + next.time_s,
+        let here = driving.odds.as_ref().map(|odds| odds.rest(driving.driver.progress()));
+        let odds = here.map(|(success, time_s)| {
+            let later = self.later.iter();
+            later.fold(Odds { success, time_s }, |sum, next| Odds {
+                success: sum.success * next.success,
+                time_s: sum.time_s + next.time_s,
+            })
         });
         let waypoint = told.waypoint.map(|pose| [pose.position.x, pose.position.y, pose.heading.radians()]);
         let (speed, option) = (told.speed_mps, told.option.to_string());
-        DispatchLine::Reply(DispatchReply { waypoint, speed, option, status, odds: Some(odds) })
+        DispatchLine::Reply(DispatchReply { waypoint, speed, option, status, odds })
     }
 
     /// Returns true if a robot can be at `pose`: its middle is in the free space of the map.
@@ -236,9 +288,14 @@ impl Dispatcher {
 
 impl Driving {
     fn new(plan: Plan, state: RobotState) -> Self {
-        let (odds, plan) = (plan.solution.odds(), Arc::new(plan));
+        let (odds, plan) = (Some(plan.solution.odds()), Arc::new(plan));
         Self { driver: RemoteDriver::from_state(vec![Arc::clone(&plan)], state, true), plan, odds }
     }
+}
+
+/// Whether `now` is further from `at` than so many metres or radians.
+fn is_elsewhere(at: &Pose, now: &Pose, (moved_m, turned_rad): (f64, f64)) -> bool {
+    at.distance_m(now) > moved_m || at.heading.turn_to(now.heading).abs() > turned_rad
 }
 
 fn odds(plan: &Plan) -> Odds {

@@ -1,26 +1,30 @@
 //! Learning a whole building: library, abstraction, options, hand-overs, and a report with pictures of where it is weak.
 
+use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
+use rand::RngExt;
 use serde::Serialize;
 use sharp_drive::World;
 use sharp_maps::MapFile;
 use sharp_plan::{
-    AbstractionFile, Area, BuildingMonitor, BuildingShare, BuildingWork, MeasuredStretch, Part, Roster,
-    Sharp, WeakPlace, measured_stretches, weak_places,
+    AbstractionFile, Area, BuildingMonitor, BuildingShare, BuildingWork, MeasuredStretch, Part, Query,
+    Roster, Sharp, WeakPlace, measured_stretches, weak_places,
 };
 use sharp_sim::NoiseModel;
-use sharp_space::{Cell, GridFrame, Point, Seed};
+use sharp_space::{Cell, CollisionChecker, GridFrame, Point, Pose, Seed};
 
 use crate::error::BenchError;
 use crate::jobs::{Engine, EngineMonitor, Lesson, Manifest, unfinished};
-use crate::named::{self, InputError, noise, robot};
+use crate::named::{self, InputError, NamedProblem, noise, robot};
 use crate::pictures;
 use crate::reports::MapReport;
 use crate::solve::{SolveSettings, prepare};
 
+/// Starts and goals that are drawn before a map counts as too small or too full for them.
+const DRAWS_MAX: usize = 10_000_000;
 /// How the names of folders begin, beside those of a library, in which workers share the learning of a building.
 const LEARNING: &str = "learning-";
 /// Places that a report names.
@@ -56,6 +60,37 @@ impl NamedWorld {
             noise: noise_name.to_owned(),
             noise_model: noise(noise_name)?,
         })
+    }
+
+    /// `query` here.
+    #[must_use]
+    pub fn problem(&self, query: Query) -> NamedProblem {
+        let Self { map, world, noise, noise_model, .. } = self.clone();
+        NamedProblem { map, world, query, noise, noise_model }
+    }
+
+    /// `count` random starts and goals, in any heading and wherever the robot stands free, at least 8 m apart, or 30 m on a map
+    /// with a side of more than 40 m. Whether a way joins them is left open.
+    #[must_use]
+    pub fn random_queries(&self, count: usize, seed: Seed) -> Vec<Query> {
+        let world = &self.world;
+        let frame = world.grid.frame();
+        let bounds = frame.bounds();
+        let least_m = if frame.width_m().max(frame.height_m()) > 40.0 { 30.0 } else { 8.0 };
+        let mut rng = seed.stream("questions", 0);
+        let mut pose = || {
+            let x = rng.random_range(bounds.min.x..bounds.max.x);
+            let y = rng.random_range(bounds.min.y..bounds.max.y);
+            Pose::new(x, y, rng.random_range(-PI..PI))
+        };
+        // What is wrong with an end takes long to say.
+        let is_free = |pose: &Pose| world.geometry.is_free(*pose);
+        let is_sound = |query: &Query| {
+            let is_far = query.start.distance_m(&query.goal) >= least_m;
+            is_far && is_free(&query.start) && is_free(&query.goal) && query.check(world).is_ok()
+        };
+        let queries = std::iter::repeat_with(|| Query { start: pose(), goal: pose() });
+        queries.take(DRAWS_MAX).filter(is_sound).take(count).collect()
     }
 
     /// The robot with what the library in the folder `library` knows of the building, and with the abstraction that it

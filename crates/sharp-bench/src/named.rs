@@ -77,6 +77,12 @@ impl InputError {
     }
 }
 
+/// `name` as a worker finds it that was started elsewhere: files by their whole path.
+pub(crate) fn from_here(name: &str) -> String {
+    let path = std::path::absolute(name).ok().filter(|path| path.is_file());
+    path.map_or_else(|| name.to_owned(), |path| path.display().to_string())
+}
+
 /// A problem with the names that reports print beside it.
 #[derive(Clone, Debug)]
 pub struct NamedProblem {

@@ -129,8 +129,8 @@ pub fn solve(
 /// their plan or run none.
 pub(crate) fn with_recovery(tour: &Tour, settings: &SolveSettings) -> Option<Verified> {
     let method = &settings.method;
-    let sticks = method.keeps_all() || method.verify_episodes == 0;
-    if sticks || tour.predicted.rate() >= SHAKY {
+    let is_run = tour.plans.iter().all(|plan| plan.solution.composed.is_none());
+    if method.keeps_all() || !is_run || tour.predicted.rate() >= SHAKY {
         return None;
     }
     let first = &tour.plans[0];

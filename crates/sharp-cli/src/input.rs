@@ -242,7 +242,11 @@ fn at_pixel(map: &MapFile, flag: &str, text: &str) -> Result<(Pose, bool), Failu
     let (Ok(col), Ok(row)) = (col.parse(), row.parse()) else { return Err(broken()) };
     let point = map.pixel(col, row).ok_or_else(broken)?;
     let typed = format!("{},{},{}", point.x, point.y, yaw.unwrap_or("0"));
-    Ok((pose(flag, &typed, HeadingRule::Needed)?, yaw.is_some()))
+    let pose = pose(flag, &typed, HeadingRule::Needed).map_err(|_| {
+        let expected = "a column, a row and a heading: C,R,YAW";
+        Failure::new("POSE_INVALID", format!("{flag} is {text:?}, expected {expected}"))
+    })?;
+    Ok((pose, yaw.is_some()))
 }
 
 /// Problem `number` of the scenarios in `file`.

@@ -156,11 +156,21 @@ pub(crate) use say;
 
 pub(crate) fn print_line(line: fmt::Arguments<'_>) {
     use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{line}");
+    heed(writeln!(std::io::stdout(), "{line}"));
 }
 
 /// Prints `bytes` on stdout; a reader that has gone away is no error.
 pub(crate) fn say_bytes(bytes: &[u8]) {
     use std::io::Write;
-    let _ = std::io::stdout().write_all(bytes);
+    heed(std::io::stdout().write_all(bytes));
+}
+
+/// Ends the program if stdout cannot take what was printed, as on a full disk: nobody may take the rest for the whole.
+fn heed(printed: std::io::Result<()>) {
+    if let Err(error) = printed
+        && error.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        eprintln!("error: stdout: {error}");
+        std::process::exit(i32::from(Exit::Broken as u8));
+    }
 }

@@ -149,11 +149,7 @@ impl Automaton {
         self.observation = self.observation.after(world, motion);
         let index = self.index();
         let (guide, pose) = (&self.links[index].option.guide, &motion.after.pose);
-        match motion.command {
-            Some(_) => self.progress.update(guide, pose),
-            // Who has backed off may be at another place of the guide than its window shows.
-            None => self.progress = GuideProgress::start(guide, pose),
-        }
+        self.progress.update(guide, pose);
         let visit = &mut self.visits[index];
         visit.time_s += motion.time_s;
         if visit.half_s.is_none() && self.progress.arc_m >= 0.5 * guide.length_m() {

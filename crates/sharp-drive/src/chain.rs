@@ -52,9 +52,10 @@ impl Chain {
         Self { links, policies, uses_slip_estimate }
     }
 
-    /// Runs the chain once in `episode`, from `start` under the noise of (`seed`, `number`).
+    /// Runs the chain once in `episode`, from `start` under the noise of (`seed`, `number`). What policies remember of an
+    /// episode ends with it.
     pub(crate) fn run(
-        &mut self,
+        &self,
         world: &World,
         episode: &mut Episode,
         start: RobotState,
@@ -62,8 +63,8 @@ impl Chain {
     ) -> ChainRun {
         episode.begin(start, seed, number);
         let observation = self.first(start, episode.vehicle().noise());
-        let links = Arc::clone(&self.links);
-        let mut controller = ChainController::new(world, links, &mut self.policies, observation);
+        let (links, mut policies) = (Arc::clone(&self.links), self.policies.clone());
+        let mut controller = ChainController::new(world, links, &mut policies, observation);
         let end = episode.drive(&mut controller, &Supervisor::silent());
         let arrival = controller.automaton.observation().state;
         ChainRun { visits: controller.automaton.visits().to_vec(), arrival, end }

@@ -121,7 +121,7 @@ impl<'a> MonteCarlo<'a> {
         states: &InitialStates,
         failures_max: u32,
     ) -> SuccessEstimate {
-        let drive = |chain: &mut Chain, episode: &mut Episode, number| {
+        let drive = |chain: &Chain, episode: &mut Episode, number| {
             let start = states.draw(&mut self.seed.stream("trial start", number));
             let run = chain.run(self.world, episode, start, (self.seed, number));
             (run.passed(drivers.len() - 1), run.time_s())
@@ -194,7 +194,7 @@ impl<'a> MonteCarlo<'a> {
         &self,
         drivers: &[Driver<'_>],
         episodes: Range<u32>,
-        run: impl Fn(&mut Chain, &mut Episode, u64) -> T + Sync,
+        run: impl Fn(&Chain, &mut Episode, u64) -> T + Sync,
     ) -> Vec<T> {
         let vehicle = self.world.vehicle(self.simulator, self.noise, self.contact_ends);
         let rules = EpisodeRules::default().with_contact_ends(self.contact_ends);
@@ -202,10 +202,7 @@ impl<'a> MonteCarlo<'a> {
         episodes
             .into_par_iter()
             .with_min_len(4)
-            .map_init(
-                || (chain.clone(), episode.clone()),
-                |(chain, episode), number| run(chain, episode, u64::from(number)),
-            )
+            .map_init(|| episode.clone(), |episode, number| run(&chain, episode, u64::from(number)))
             .collect()
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use sharp_guide::GuidePath;
+use sharp_guide::{Goal, GuidePath};
 use sharp_sim::{NoiseModel, RobotState};
 use sharp_space::{Point, Pose};
 
@@ -29,7 +29,7 @@ pub struct RouteController<'a> {
     world: &'a World,
     replan: Option<Replan<'a>>,
     route: GuidePath,
-    goal: Point,
+    goal: Goal,
     policy: Box<dyn Policy>,
     observation: Observation,
     progress: GuideProgress,
@@ -62,7 +62,7 @@ impl<'a> RouteController<'a> {
         Self {
             world,
             replan: None,
-            goal: route.end().position,
+            goal: goal_at(world, route.end().position),
             route,
             policy,
             observation: Observation::first(state, noise),
@@ -78,12 +78,11 @@ impl<'a> RouteController<'a> {
     /// reaching the goal, stands still or has met an obstacle.
     #[must_use]
     pub fn with_replanning(self, goal: Point, replan: Replan<'a>) -> Self {
-        Self { replan: Some(replan), goal, ..self }
+        Self { replan: Some(replan), goal: goal_at(self.world, goal), ..self }
     }
 
     fn is_at_goal(&self) -> bool {
-        let off_m = (self.observation.state.pose.position - self.goal).norm();
-        off_m < self.world.robot.goal_tolerance_m
+        self.goal.is_reached(&self.observation.state.pose)
     }
 
     /// Begins the path at hand.
@@ -101,6 +100,11 @@ impl<'a> RouteController<'a> {
             || self.still.stands_still();
         self.is_bumped || (is_off && actions >= PATIENCE_ACTIONS)
     }
+}
+
+/// The goal at `point` as all methods are judged by it: one behind a wall is not reached, however near it is.
+fn goal_at(world: &World, point: Point) -> Goal {
+    Goal::new(point, world.robot.goal_tolerance_m, world.geometry.clearance())
 }
 
 impl Controller for RouteController<'_> {

@@ -231,16 +231,29 @@ impl RunningTask {
         let mut episode =
             Episode::new(world.vehicle(&*scenario.simulator, &noise, rules.contact_ends), rules);
         episode.begin(start, seed, number);
-        let mut automaton = Automaton::new(links, Observation::first(start, &noise).without_slip_estimate());
-        let mut has_touched = false;
+        let automaton = Automaton::new(links, Observation::first(start, &noise).without_slip_estimate());
+        let standstill = scenario.ends_at_standstill.then(|| StandstillDetector::new(start.pose));
+        let has_touched = false;
+        let mut task =
+            Self { world, interface, reward, horizon_share, episode, automaton, standstill, has_touched };
         // The learner begins where its guide does.
-        while let Some(decision) = automaton.maneuver(&world).filter(|_| !automaton.is_late()) {
-            let Ok(motion) = episode.carry_out(decision) else { break };
-            has_touched |= motion.contact;
-            automaton.observe(&world, &motion);
+        task.carry_out_maneuvers();
+        let pose = task.episode.state().pose;
+        task.standstill = task.standstill.map(|_| StandstillDetector::new(pose));
+        task
+    }
+
+    /// Does what no policy does. Returns true if the robot touched an obstacle.
+    fn carry_out_maneuvers(&mut self) -> bool {
+        let mut touched = false;
+        while let Some(decision) = self.automaton.maneuver(&self.world).filter(|_| !self.automaton.is_late())
+        {
+            let Ok(motion) = self.episode.carry_out(decision) else { break };
+            touched |= motion.contact;
+            self.automaton.observe(&self.world, &motion);
         }
-        let standstill = scenario.ends_at_standstill.then(|| StandstillDetector::new(episode.state().pose));
-        Self { world, interface, reward, horizon_share, episode, automaton, standstill, has_touched }
+        self.has_touched |= touched;
+        touched
     }
 
     fn observe(&self, observation: &mut [f32]) {
@@ -274,7 +287,11 @@ impl RunningTask {
         let before = *self.automaton.progress();
         self.automaton.observe(&self.world, &motion);
         self.has_touched |= motion.contact;
-        let collided = motion.contact && self.reward.contact_ends();
+        let mut collided = motion.contact && self.reward.contact_ends();
+        // Turning at the goal is no policy's business, as it is not when the plan is driven.
+        if !collided {
+            collided = self.carry_out_maneuvers() && self.reward.contact_ends();
+        }
         let done = !collided && self.automaton.is_done();
         let reward = self.reward(&motion, &before, done);
         let is_still = self.standstill.as_mut().is_some_and(|standstill| {

@@ -123,11 +123,12 @@ impl File {
         moments: &[Moment],
         outcome: &str,
     ) -> Result<f64, RecordError> {
-        let mut before = None;
+        let (mut before, mut is_planned_anew) = (None, false);
         let mut now_s = begin_s;
         for moment in moments {
             now_s = begin_s + moment.time_s;
             let state = &moment.state;
+            is_planned_anew |= moment.is_recovering;
             self.put("/tf", messages::TF, now_s, &messages::transforms(now_s, &state.pose))?;
             self.put("/odom", messages::ODOMETRY, now_s, &messages::odometry(now_s, state))?;
             let outline = messages::outline(now_s, &plan.world.robot.footprint);
@@ -136,7 +137,8 @@ impl File {
                 before = Some(moment.option);
                 let name = moment.option.to_string();
                 self.put("/sharp/option", messages::STRING, now_s, &messages::string(&name))?;
-                if let Some(&odds) = self.odds.get(&moment.option) {
+                // Legs of a new plan can have the names of old ones.
+                if let Some(&odds) = self.odds.get(&moment.option).filter(|_| !is_planned_anew) {
                     self.put("/sharp/odds", messages::FLOAT64, now_s, &messages::float64(odds))?;
                 }
             }

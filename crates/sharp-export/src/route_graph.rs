@@ -16,10 +16,12 @@ use sharp_sim::NoiseModel;
 use sharp_space::{Point, Seed};
 
 use crate::path::FRAME;
-use crate::way::{corners, is_line_free};
+use crate::way::{corners, has_room, is_line_free};
 
 /// Places nearer than this are one, metres.
 const SAME_PLACE_M: f64 = 1e-9;
+/// A join up to this long is a small step aside on a way that the robot drives, metres.
+const SHORT_M: f64 = 0.25;
 
 /// A route graph.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -212,11 +214,12 @@ impl RouteGraph {
         }
     }
 
-    /// Joins two nodes in both directions, if nothing stands between them.
+    /// Joins two nodes in both directions, if nothing stands between them and the robot fits.
     fn join(&mut self, world: &World, a: usize, b: usize) {
         let (from, to) = (self.nodes[a], self.nodes[b]);
         let length_m = (to - from).norm();
-        if length_m < SAME_PLACE_M || !is_line_free(&world.grid, from, to) {
+        let fits = length_m <= SHORT_M || (has_room(world, from, to) && has_room(world, to, from));
+        if length_m < SAME_PLACE_M || !fits || !is_line_free(&world.grid, from, to) {
             return;
         }
         let time_s = length_m / (0.5 * world.robot.max_speed_mps);

@@ -67,9 +67,13 @@ fn is_drawn(world: &World, points: &[Point]) -> bool {
         }
         along_m = along_m.max(ahead_m);
     }
-    let heading = Heading::of(line);
-    is_line_free(&world.grid, from, to)
-        && world.geometry.is_segment_free(Pose::at(from, heading), Pose::at(to, heading), CHECK_STEP_M)
+    is_line_free(&world.grid, from, to) && has_room(world, from, to)
+}
+
+/// Whether the robot of `world` fits all along the line from `from` to `to` when it drives that way.
+pub(crate) fn has_room(world: &World, from: Point, to: Point) -> bool {
+    let heading = Heading::of(to - from);
+    world.geometry.is_segment_free(Pose::at(from, heading), Pose::at(to, heading), CHECK_STEP_M)
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ pub fn arriving(robot: &GuideRobot<'_>, guide: &GuidePath, heading: Heading) -> 
         let free = curves.filter(|(_, curve)| curve.all(CHECK_STEP_M, |pose| robot.geometry.is_free(pose)));
         let total_m = |(arc_m, curve): &(f64, sharp_motion::Maneuver)| arc_m + curve.travel_m();
         let (arc_m, curve) = free.min_by(|a, b| total_m(a).total_cmp(&total_m(b)))?;
-        let kept = (0..guide.poses().len()).filter(|&i| guide.arc_m(i) < arc_m - CHECK_STEP_M);
+        let kept = (0..guide.poses().len()).filter(|&i| guide.arc_m(i) < arc_m - 1e-3);
         let mut poses: Vec<Pose> = kept.map(|i| guide.poses()[i]).collect();
         poses.extend(curve.poses(CHECK_STEP_M));
         GuidePath::new(poses, guide.spacing_m()).ok()

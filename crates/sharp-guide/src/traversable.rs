@@ -24,7 +24,9 @@ impl TraversableMask<'_> {
     }
 
     pub(crate) fn is_open(&self, cell: Cell) -> bool {
-        self.clearance_m(cell) >= self.least_m && (self.allowed)(cell)
+        let clearance_m = self.clearance_m(cell);
+        // What is asked for can be less than nothing where cells are large against the robot.
+        clearance_m > 0.0 && clearance_m >= self.least_m && (self.allowed)(cell)
     }
 
     /// The open cell nearest to `point` within `reach_m`; ties go to the lower cell.

@@ -78,55 +78,60 @@ pub(crate) fn solve_with(
     library: &mut OptionLibrary,
     known: &Arc<KnownOptions>,
 ) -> Result<Outcome, FileError> {
-    let mut outcome = algorithm_1(problem, abstraction, Policies::new(library), known);
-    if let Ok(Outcome::Solved(solution)) = &mut outcome {
-        verify_poor(problem, abstraction, Policies::leaving(library), known, solution)?;
-    }
-    if let Ok(Outcome::NoPlan(_)) = outcome {
-        let gap = narrowest_gap(problem.world, &problem.query);
-        // What quick guides cannot reach may be reached by manoeuvring, unless the robot does not fit.
-        if let Some(method) = problem.method.patient().filter(|_| fits(problem.world, gap.as_ref())) {
-            let patient = PlanningProblem { method: &method, ..*problem };
-            outcome = algorithm_1(&patient, abstraction, Policies::new(library), known);
-        }
-        if let Ok(Outcome::NoPlan(reason)) = &mut outcome {
-            *reason = describe(problem, gap.as_ref(), reason);
-        }
-    }
+    let mut policies = Policies::new(library);
+    let outcome = answer(problem, abstraction, &mut policies, known);
     library.end_problem(matches!(outcome, Ok(Outcome::Solved(_) | Outcome::NoPlan(_))));
     problem.monitor.phase(Phase::Done);
     outcome
 }
 
-/// Puts the plan of the usual method in the place of a composed `solution` that promises little, if it costs less.
-fn verify_poor(
+/// Algorithm 1, and where its odds were composed and are poor, once more by the usual method.
+fn answer(
     problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
-    policies: Policies<'_>,
+    policies: &mut Policies<'_>,
     known: &Arc<KnownOptions>,
-    solution: &mut Box<Solution>,
-) -> Result<(), FileError> {
-    let failure_cost_s = problem.method.failure_cost_s;
-    let Some(method) = problem.method.usual.as_deref().filter(|_| solution.success() < COMPOSED_USABLE)
-    else {
-        return Ok(());
+) -> Result<Outcome, FileError> {
+    let PlanningProblem { world, method, query, .. } = *problem;
+    let mut outcome = algorithm_1(problem, abstraction, policies, known)?;
+    let gap = matches!(outcome, Outcome::NoPlan(_)).then(|| narrowest_gap(world, &query)).flatten();
+    let is_poor = match &outcome {
+        Outcome::Solved(solution) => !method.keeps_all() && solution.success() < COMPOSED_USABLE,
+        // What quick guides cannot reach may be reached by manoeuvring, unless the robot does not fit.
+        Outcome::NoPlan(_) => fits(world, gap.as_ref()),
+        Outcome::Stopped => false,
     };
-    // Repairs are for this problem alone: an option of the library that changed would no longer be the one whose hand-overs
-    // were driven, and the answer to a question would depend on those before it.
-    let usual = PlanningProblem { method, ..*problem };
-    if let Outcome::Solved(other) = algorithm_1(&usual, abstraction, policies, known)?
-        && other.cost_s(failure_cost_s) < solution.cost_s(failure_cost_s)
-    {
-        *solution = other;
+    if let Some(usual) = method.usual().filter(|_| is_poor) {
+        // Repairs would be for this problem alone: an option of the library that changed would no longer be the one whose
+        // hand-overs were driven, and the answer to a question would depend on those before it.
+        policies.leave_library();
+        let usual = PlanningProblem { method: &usual, ..*problem };
+        let other = algorithm_1(&usual, abstraction, policies, known)?;
+        outcome = cheaper(outcome, other, method.failure_cost_s);
     }
-    Ok(())
+    if let Outcome::NoPlan(reason) = &mut outcome {
+        *reason = describe(problem, gap.as_ref(), reason);
+    }
+    Ok(outcome)
+}
+
+/// The one of two outcomes of a problem that costs less; `second` where neither is a plan.
+fn cheaper(first: Outcome, second: Outcome, failure_cost_s: f64) -> Outcome {
+    match (first, second) {
+        (Outcome::Solved(first), Outcome::Solved(second)) => {
+            let is_better = second.cost_s(failure_cost_s) < first.cost_s(failure_cost_s);
+            Outcome::Solved(if is_better { second } else { first })
+        }
+        (first @ Outcome::Solved(_), _) => first,
+        (_, second) => second,
+    }
 }
 
 /// The algorithm itself, at most 60 lines.
 fn algorithm_1(
     problem: &PlanningProblem<'_>,
     abstraction: &Abstraction,
-    mut policies: Policies<'_>,
+    policies: &mut Policies<'_>,
     known: &Arc<KnownOptions>,
 ) -> Result<Outcome, FileError> {
     let PlanningProblem { world, method, conditions, query, seed, monitor } = *problem;
@@ -145,7 +150,7 @@ fn algorithm_1(
     let (mut chosen, mut measured): (_, Vec<Vec<LegId>>) = (vec![], vec![]);
     for attempt in 1..=ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
-        let Some((_, p)) = cheapest(problem, &mut search, &policies) else {
+        let Some((_, p)) = cheapest(problem, &mut search, policies) else {
             if monitor.should_stop() && best.is_none() {
                 return Ok(Outcome::Stopped);
             }
@@ -158,7 +163,7 @@ fn algorithm_1(
         // Beyond the paper: the guides of p are joined to one smooth path.
         let p = join(problem, p);
         // 10 to 20: Pi <- pi_0, o.policy for each o in p, pi_{n+1}; who has no policy (14) is trained (11, 16, 19)
-        if monitor.should_stop() || !learn_missing(problem, &p, &search, &mut policies)? {
+        if monitor.should_stop() || !learn_missing(problem, &p, &search, policies)? {
             // Whoever stops the search gets the best plan so far.
             if best.is_some() {
                 break;
@@ -175,18 +180,17 @@ fn algorithm_1(
         let may_go_on = attempt < ATTEMPTS_MAX || best.is_some();
         if !is_composed
             && may_go_on
-            && has_weak_option(problem, &p, &policies)
-            && other_s(&mut search, &policies, &measured).is_finite()
+            && has_weak_option(problem, &p, policies)
+            && other_s(&mut search, policies, &measured).is_finite()
         {
             continue;
         }
         // Beyond the paper: Pi is repaired and measured, and the search looks again while another plan seems cheaper.
         monitor.phase(Phase::Verify);
-        let is_stopped =
-            !is_composed && !repair(&Repair { problem, plan: &p, search: &search }, &mut policies)?;
+        let is_stopped = !is_composed && !repair(&Repair { problem, plan: &p, search: &search }, policies)?;
         let solution = match is_composed {
-            true => predict(problem, &p, &mut policies, known),
-            false => verify(problem, &p, &policies),
+            true => predict(problem, &p, policies, known),
+            false => verify(problem, &p, policies),
         };
         measured.push(names(&p));
         let is_near = query.start.distance_m(&query.goal) <= COMPOSED_DIRECT_M;
@@ -203,14 +207,14 @@ fn algorithm_1(
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
         if is_stopped
             || measured.len() == most
-            || best_s <= method.retry_above * other_s(&mut search, &policies, &measured)
+            || best_s <= method.retry_above * other_s(&mut search, policies, &measured)
         {
             break;
         }
     }
     if let Some(odds) = best.as_ref().and_then(|best| best.composed.as_ref()) {
-        let odds = refine(problem, &chosen, &mut policies, odds)?;
-        best = Some(composed(problem, &chosen, &policies, odds));
+        let odds = refine(problem, &chosen, policies, odds)?;
+        best = Some(composed(problem, &chosen, policies, odds));
     }
     // 21: return Pi. A plan that hardly ever succeeds is none, unless whatever was learnt is to be kept.
     Ok(match best.filter(|solution| method.keeps_all() || solution.predicted.rate() >= LEAST_SUCCESS) {

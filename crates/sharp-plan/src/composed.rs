@@ -79,6 +79,11 @@ impl ComposedPolicy {
         }
     }
 
+    /// The plan that it drives.
+    pub(crate) fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
     /// The composed policy of `plan` for a robot that comes to `state` from another plan: it may stand beside the guide and
     /// look elsewhere, so there is a new way from where it is, if there is one.
     pub(crate) fn arriving(plan: Arc<Plan>, state: RobotState, recovery: bool) -> Self {

@@ -58,11 +58,21 @@ pub fn hash(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex().to_string()
 }
 
-/// Writes `bytes` to `path` so that a reader sees the old content or the new, never a mix.
+/// Writes `bytes` to `path` so that a reader sees the old content or the new, never a mix. A link stays one, and what is no
+/// plain file, as a pipe or `/dev/stdout`, is written into.
 ///
 /// # Errors
 /// Returns an error that names the file if the folder cannot be made or written.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    if let Ok(found) = fs::metadata(path) {
+        if !found.is_file() && !found.is_dir() {
+            let mut target = fs::OpenOptions::new().write(true).open(path).map_err(io(path))?;
+            return target.write_all(bytes).map_err(io(path));
+        }
+        if path.is_symlink() {
+            return write_atomic(&fs::canonicalize(path).map_err(io(path))?, bytes);
+        }
+    }
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io(folder))?;
     let mut builder = tempfile::Builder::new();

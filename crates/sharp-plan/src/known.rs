@@ -14,6 +14,7 @@ use crate::hand_over::{HandOver, Identities, chain_key};
 use crate::library::OptionLibrary;
 use crate::method::Method;
 use crate::price::{Price, Pricer};
+use crate::repair::ENTERED_MIN;
 use crate::roster::fingerprint;
 
 /// The options of a library in one building under one method. A search that is given it finds all of them guided, and
@@ -78,7 +79,9 @@ impl KnownOptions {
         let charge = |(&(before, after), pair): (&(OptionId, OptionId), &SuccessEstimate)| {
             let alone = library.get(after)?.learnt.estimate.count;
             let loss = alone.lower95() - pair.count.rate();
-            (loss > 0.0).then_some(((LegId::Option(before), LegId::Option(after)), failure_cost_s * loss))
+            let is_known = pair.count.episodes >= ENTERED_MIN;
+            (is_known && loss > 0.0)
+                .then_some(((LegId::Option(before), LegId::Option(after)), failure_cost_s * loss))
         };
         self.hand_overs.iter().filter_map(charge).collect()
     }

@@ -16,6 +16,8 @@ use crate::learn::{OptionLearner, PaperProtocol, PriorOnly, Selection};
 
 /// Prices are not exact, and rather too high: a plan is tried though its price is up to 1.4 times what the best one cost.
 const RETRY_ABOVE: f64 = 0.7;
+/// Runs of a whole plan that its success is counted on at most.
+const VERIFY_EPISODES: u32 = 1000;
 
 /// How fast legs without a guide are thought to be driven where an answer is wanted at once, as a share of the top speed.
 const UNGUIDED_SPEED: f64 = 0.6;
@@ -46,6 +48,8 @@ pub struct Method {
     pub simulator: SimulatorKind,
     /// How guides are planned.
     pub guides: Arc<dyn GuidePlanner>,
+    /// True where `guides` is another planner than the one that the search settings name.
+    pub has_other_guides: bool,
     /// What the search may assume and must respect.
     pub search: SearchSettings,
     /// In which order the options of a plan are learnt.
@@ -73,8 +77,9 @@ pub struct Method {
     pub verify_episodes: u32,
     /// Half the width of the 95 % interval of the predicted success at which counting ends earlier; 0 for never.
     pub verify_half_width: f64,
-    /// For a method that composes its odds: the one that is asked where they are poor.
-    pub usual: Option<Arc<Self>>,
+    /// For a method that composes its odds: what [`composed`](Self::composed) found in `verify_episodes` and `search`. Where odds
+    /// are poor the method is asked as it was then.
+    pub unhurried: Option<(u32, SearchSettings)>,
 }
 
 /// In which order the options of a plan are learnt.
@@ -260,6 +265,7 @@ impl Method {
             learner: Arc::new(PriorOnly),
             simulator: SimulatorKind::Kinematic,
             guides: search.guide.to_planner(),
+            has_other_guides: false,
             search,
             order: LearningOrder::Chained,
             keeps_trainings: false,
@@ -270,9 +276,9 @@ impl Method {
             usable_success: 0.9,
             retry_above: f64::INFINITY,
             repair: RepairSettings { rounds: 0, episodes: 1000, wanted_success: 0.99, judge_episodes: 500 },
-            verify_episodes: 1000,
+            verify_episodes: VERIFY_EPISODES,
             verify_half_width: 0.01,
-            usual: None,
+            unhurried: None,
         }
     }
 
@@ -296,33 +302,40 @@ impl Method {
     /// The same with our guide planner under these settings.
     #[must_use]
     pub fn with_guides(self, guide: GuideSettings) -> Self {
-        Self { guides: guide.to_planner(), search: SearchSettings { guide, ..self.search }, ..self }
+        let search = SearchSettings { guide, ..self.search };
+        Self { guides: guide.to_planner(), has_other_guides: false, search, ..self }
     }
 
     /// The same for questions to a building that was learnt: odds are composed of what the library knows, nothing is run
-    /// from end to end or repaired, and few guides are planned. Only where the odds are poor is this method asked as well.
+    /// from end to end or repaired, and few guides are planned. Only where the odds are poor is this method asked as well,
+    /// without its repairs. Guide planners other than [`PlannerKind::ClearanceSearch`] stay as they are.
     #[must_use]
     pub fn composed(self) -> Self {
-        let guide = self.search.guide.unsampled();
+        let unhurried = Some((self.verify_episodes, self.search));
         let search = SearchSettings { direct_routes: 1, unguided_speed: UNGUIDED_SPEED, ..self.search };
+        let this = Self { verify_episodes: 0, search, unhurried, ..self };
+        let is_ours = !this.has_other_guides && this.search.guide.planner == PlannerKind::ClearanceSearch;
+        if is_ours { this.with_guides(search.guide.unsampled()) } else { this }
+    }
+
+    /// The method that is asked where the odds of this one are poor: with its patience, and with runs from end to end.
+    /// `None` for a method that does not compose odds.
+    pub(crate) fn usual(&self) -> Option<Self> {
+        let (episodes, SearchSettings { direct_routes, unguided_speed, guide, .. }) = self.unhurried?;
+        let GuideSettings { sampling, seeds, .. } = guide;
+        let guide = GuideSettings { sampling, seeds, ..self.search.guide };
+        let search = SearchSettings { direct_routes, unguided_speed, ..self.search };
         // A repair takes ten seconds and more, and is for this plan alone.
         let repair = RepairSettings { rounds: 0, ..self.repair };
-        let usual = (self.verify_episodes > 0 && !self.keeps_all())
-            .then(|| Arc::new(Self { repair, ..self.clone() }));
-        Self { verify_episodes: 0, search, usual, ..self }.with_guides(guide)
+        let verify_episodes = if episodes == 0 { VERIFY_EPISODES } else { episodes };
+        let usual = Self { verify_episodes, search, repair, unhurried: None, ..self.clone() };
+        Some(if self.has_other_guides { usual } else { usual.with_guides(guide) })
     }
 
     /// Whether a plan is kept even if it rarely succeeds: the paper's rule.
     #[must_use]
     pub fn keeps_all(&self) -> bool {
         self.usable_success == 0.0
-    }
-
-    /// A composed method with all the patience of the usual one for guides; `None` for one that has it.
-    pub(crate) fn patient(&self) -> Option<Self> {
-        let usual = SearchSettings { guide: GuideSettings::default(), ..self.search };
-        let is_hurried = self.verify_episodes == 0 && self.search.guide.sampling != usual.guide.sampling;
-        is_hurried.then(|| self.clone().with_guides(usual.guide))
     }
 
     /// The same with guides by Learn and Link, as in the paper.
@@ -335,7 +348,7 @@ impl Method {
     /// The same with another guide planner. A plan that is read from a file goes on with ours.
     #[must_use]
     pub fn with_guide_planner(self, guides: Arc<dyn GuidePlanner>) -> Self {
-        Self { guides, ..self }
+        Self { guides, has_other_guides: true, ..self }
     }
 
     /// The same with another learner, under a name of its own: policies of two learners never mix in a library.

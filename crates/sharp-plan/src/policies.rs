@@ -31,9 +31,10 @@ impl<'a> Policies<'a> {
         Self { library, adds: true, learnt: BTreeMap::new(), fresh: BTreeSet::new() }
     }
 
-    /// The same for a problem that leaves the library as it is.
-    pub(crate) fn leaving(library: &'a mut OptionLibrary) -> Self {
-        Self { adds: false, ..Self::new(library) }
+    /// Forgets the legs of this problem alone, and leaves the library as it is from now on.
+    pub(crate) fn leave_library(&mut self) {
+        self.adds = false;
+        self.learnt.clear();
     }
 
     /// The policy of the leg called `id`. One that was trained without a single success is none while it may be trained again.

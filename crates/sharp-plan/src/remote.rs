@@ -94,13 +94,20 @@ enum Pending {
     BackOff { from: Pose, distance_m: f64, actions: u32 },
 }
 
+/// A robot that moved this many times as far as its top speed allows was carried, not driven.
+const CARRIED_FACTOR: f64 = 2.0;
+
 impl Reading {
     /// The state of `robot`, if it was in the state `before` one action ago: motion that was not told is taken from there.
     #[must_use]
     pub fn state(&self, robot: &RobotModel, before: Option<&RobotState>) -> RobotState {
         let mut state = RobotState::at_rest(self.pose);
         let action_s = ActionSettings::default().action_s;
-        if let Some(before) = before {
+        // A robot that went faster than it can was carried.
+        let is_driven = |before: &&RobotState| {
+            before.pose.distance_m(&self.pose) < CARRIED_FACTOR * robot.max_speed_mps * action_s
+        };
+        if let Some(before) = before.filter(is_driven) {
             state.velocity = before.pose.to_local(self.pose.position) / action_s;
             state.yaw_rate_radps = before.pose.heading.turn_to(self.pose.heading) / action_s;
         }

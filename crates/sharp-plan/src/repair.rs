@@ -36,6 +36,9 @@ pub(crate) struct Repair<'a> {
 /// runs, and taken back if they say so. Returns false if it was stopped.
 pub(crate) fn repair(repair: &Repair<'_>, policies: &mut Policies<'_>) -> Result<bool, FileError> {
     let settings = repair.problem.method.repair;
+    if settings.rounds == 0 {
+        return Ok(true);
+    }
     let mut runs = run_plan(repair, policies);
     let mut tried = BTreeSet::new();
     for round in 0..settings.rounds {

@@ -334,7 +334,7 @@ mod tests {
     #[test]
     fn a_composed_plan_with_poor_odds_gives_way_to_one_that_was_run_and_the_library_stays() {
         let composed = Method::fast().composed();
-        let hurried = Method { usual: None, ..composed.clone() };
+        let hurried = Method { unhurried: None, ..composed.clone() };
         let query = Query { start: Pose::new(1.4, 4.2, 0.0), goal: Pose::new(8.6, 1.4, 0.0) };
         let mut sharp = ring().with_noise(NoiseModel::nominal().scaled(5.0)).with_method(hurried);
         let Answer::Solved(poor) = sharp.solve(query, &()).expect("in memory") else { panic!("a ring") };

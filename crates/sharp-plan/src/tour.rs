@@ -16,7 +16,7 @@ use sharp_drive::{
 };
 use sharp_guide::GuidedOption;
 use sharp_sim::{ActionSettings, RobotState, Simulator};
-use sharp_space::{OccupancyGrid, Pose, Seed};
+use sharp_space::{Heading, OccupancyGrid, Point, Pose, Seed};
 
 use crate::composed::{ComposedPolicy, Events};
 use crate::execute::{Execution, RunSettings, TIME_LIMIT_FACTOR, rules};
@@ -30,6 +30,8 @@ const END_WITHIN_M: f64 = 0.1;
 const ACTIONS_TO_END_MAX: u32 = 8;
 /// Its speed there, metres per second, at most.
 const APPROACH_MPS: f64 = 0.3;
+/// Distance between two tests of the outline on the way there, metres.
+const CHECK_STEP_M: f64 = 0.05;
 /// Where it is then nearer to the start of the next plan than this, metres and radians, that plan holds as it is.
 const START_WITHIN: (f64, f64) = (0.25, 0.4);
 /// Most runs that a prediction is counted on: each plans anew at every goal, which takes far longer than driving.
@@ -100,6 +102,15 @@ impl Tour {
         match &self.plans[..] {
             [plan] => plan.solution.success(),
             _ => self.predicted.rate(),
+        }
+    }
+
+    /// The lower end of the two-sided 95 % interval of that chance.
+    #[must_use]
+    pub fn predicted_lower95(&self) -> f64 {
+        match &self.plans[..] {
+            [plan] => plan.solution.composed.as_ref().map_or(self.predicted.lower95(), |odds| odds.lower95),
+            _ => self.predicted.lower95(),
         }
     }
 
@@ -255,7 +266,19 @@ impl TourPolicy {
         let off_m = self.current.observation().state.pose.distance_m(&end);
         let (actions, least_m) = self.since_reached;
         self.since_reached = (actions + 1, off_m.min(least_m));
-        off_m > END_WITHIN_M && off_m < least_m && actions < ACTIONS_TO_END_MAX
+        self.has_room_to(end.position)
+            && off_m > END_WITHIN_M
+            && off_m < least_m
+            && actions < ACTIONS_TO_END_MAX
+    }
+
+    /// Whether the robot fits all along the straight line to `place`, with a margin. Else the next plan begins where it stands.
+    fn has_room_to(&self, place: Point) -> bool {
+        let (world, at) = (&self.current.plan().world, self.current.observation().state.pose.position);
+        let heading = Heading::of(place - at);
+        world.guide_robot().inflated_at(None).next().is_some_and(|robot| {
+            robot.geometry.is_segment_free(Pose::at(at, heading), Pose::at(place, heading), CHECK_STEP_M)
+        })
     }
 
     /// Slowly to the end of the guide, so that the robot stands there as the next plan supposes.

@@ -1,4 +1,5 @@
-//! A check of Definition 2. It is slow and simple, and shares no code with the construction of diagrams.
+//! A check of Definition 2. It is slow and simple, and shares only the free cells and the moves between them with the construction
+//! of diagrams.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -59,7 +59,7 @@ pub fn score_doors(
         door_recall: found as f64 / doors.len().max(1) as f64,
         regions: regions.len(),
         false_regions,
-        false_per_door: false_regions as f64 / found as f64,
+        false_per_door: if found == 0 { f64::INFINITY } else { false_regions as f64 / found as f64 },
     }
 }
 

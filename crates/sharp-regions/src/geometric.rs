@@ -51,7 +51,7 @@ struct Site {
 
 /// Finds doorways, junctions, bends and mouths of corridors that `footprint` can enter.
 ///
-/// Regions come in row-major order of their representatives, do not overlap and are numbered in
+/// Regions come in row-major order of the places they were found at, do not overlap and are numbered in
 /// that order; an open hall or a map without free space has none.
 #[must_use]
 pub fn detect_geometric(

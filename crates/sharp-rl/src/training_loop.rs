@@ -110,7 +110,7 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
                 let (found, confirmed) = self.evaluate_and_keep()?;
                 (evaluation, reached) = (Some(found), confirmed);
             }
-            let asked = self.report_progress(evaluation, observer);
+            let asked = self.report_progress(evaluation, reached, observer);
             if reached {
                 break StopReason::Rule;
             }
@@ -305,7 +305,12 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
     }
 
     /// Calls the observer; returns true if it asks to stop.
-    fn report_progress(&self, evaluation: Option<Evaluation>, observer: &mut Observer<'_>) -> bool {
+    fn report_progress(
+        &self,
+        evaluation: Option<Evaluation>,
+        is_over: bool,
+        observer: &mut Observer<'_>,
+    ) -> bool {
         let count = self.recent.len().max(1) as f64;
         let mean = |of: fn(&EpisodeSums) -> f64| self.recent.iter().map(of).sum::<f64>() / count;
         let metrics = [
@@ -329,7 +334,9 @@ impl<'a, E: Environment + Clone> TrainingLoop<'a, E> {
             stop: Some(self.settings.stop),
             ..Progress::new(&self.state.sac.actor, self.state.env_steps)
         };
-        observer(&progress.with_checkpoint(&checkpoint)).is_break()
+        // A state does not tell that the stop was met: a run that went on from here would train on.
+        let progress = if is_over { progress } else { progress.with_checkpoint(&checkpoint) };
+        observer(&progress).is_break()
     }
 }
 

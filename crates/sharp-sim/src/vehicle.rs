@@ -173,9 +173,15 @@ impl<S: Simulator> Vehicle<S> {
         let time_max_s = 1.0 + 2.0 * distance_m / speed_mps;
         let mut report = self.blank_report();
         let start = report.before.pose;
+        // It may begin at a wall; once it is free of it, it must not touch another.
+        let mut is_free = false;
         while start.distance_m(&self.state().pose) < distance_m && report.time_s < time_max_s {
             report.contact = false;
             self.hold(command, &noise, &mut report);
+            if report.contact && is_free && self.settings.stop_at_contact {
+                break;
+            }
+            is_free |= !report.contact;
         }
         self.finish(report)
     }

@@ -253,6 +253,8 @@ impl Footprint {
                 Self::rectangle(half_length_m + margin_m, half_width_m + margin_m)
             }
             Shape::Disc { radius_m } => Self::disc(radius_m + margin_m),
+            // Further in, the sides pass the reference point and the outline turns inside out.
+            Shape::Polygon(hull) if margin_m <= -hull.inner_radius_m => Err(FootprintError::ReferenceOutside),
             Shape::Polygon(hull) => Self::polygon(&moved_out(hull.corners(), margin_m)),
         }
     }

@@ -26,6 +26,7 @@ use crate::error::BenchError;
 use crate::json::to_json;
 use crate::learn::{NamedWorld, learn};
 use crate::named::DETECTORS;
+use crate::named::from_here;
 use crate::solve::{AbstractionRequest, SolveSettings};
 
 const SCHEMA: &str = "sharp.lesson/1";
@@ -260,12 +261,6 @@ impl LessonMark {
     fn of(job: &Job) -> Self {
         Self { schema: SCHEMA.to_owned(), job: job.key.clone() }
     }
-}
-
-/// `name` as a worker finds it that was started elsewhere: files by their whole path.
-fn from_here(name: &str) -> String {
-    let path = std::path::absolute(name).ok().filter(|path| path.is_file());
-    path.map_or_else(|| name.to_owned(), |path| path.display().to_string())
 }
 
 /// What watches a lesson.

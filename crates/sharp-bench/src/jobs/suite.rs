@@ -7,6 +7,7 @@ use sharp_space::Seed;
 use super::experiment::{Experiment, Inputs, SharpSettings, System};
 use super::machine::version;
 use crate::error::BenchError;
+use crate::named::from_here;
 use crate::result::default_regions;
 
 /// A suite of problems, or a part of it. Empty lists select everything that the suite has.
@@ -131,8 +132,10 @@ impl SuiteSelection {
             let problems = self.problems_of(&env)?;
             for robot in chosen("robots", &self.robots, self.suite.robots())? {
                 for noise in &self.noise {
-                    let inputs = Inputs::read(&env, &robot, noise, Some(&self.regions))?;
-                    let world = SuiteWorld { env: &env, robot: &robot, noise, problems: &problems, inputs };
+                    let (noise, regions) = (from_here(noise), from_here(&self.regions));
+                    let inputs = Inputs::read(&env, &robot, &noise, Some(&regions))?;
+                    let world =
+                        SuiteWorld { env: &env, robot: &robot, noise: &noise, problems: &problems, inputs };
                     for trial in 0..self.trials.unwrap_or(self.suite.trials()) {
                         let system = |system: &System| self.experiment(&world, trial, system.clone());
                         experiments.extend(systems.iter().map(system));
@@ -209,7 +212,7 @@ impl SuiteSelection {
         SharpSettings {
             options,
             learning: learning.to_owned(),
-            regions: self.regions.clone(),
+            regions: from_here(&self.regions),
             recovery: self.recovery,
             cost_update: self.cost_update,
         }

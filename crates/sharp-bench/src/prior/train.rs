@@ -31,7 +31,7 @@ pub enum PriorTrainError {
         robot: String,
     },
     /// The saved state cannot be read.
-    #[error("saved state: {0}")]
+    #[error("the saved state beside the output: {0}; remove it to train from nothing")]
     State(String),
     /// Learning failed.
     #[error(transparent)]

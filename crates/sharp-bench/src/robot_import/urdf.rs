@@ -286,7 +286,15 @@ fn shape(geometry: Node<'_, '_>) -> Result<Option<Vec<[f64; 3]>>, String> {
             let radius = number("radius", &attribute(node, "radius")?)?;
             round(radius, 0.5 * number("length", &attribute(node, "length")?)?).collect()
         }
-        "sphere" => round(number("radius", &attribute(node, "radius")?)?, 0.0).collect(),
+        // Rings from pole to pole, so that it is as wide in every frame.
+        "sphere" => {
+            let radius = number("radius", &attribute(node, "radius")?)?;
+            let ring = |index: usize| {
+                let (sin, cos) = trig::sin_cos(std::f64::consts::PI * index as f64 / ROUND_CORNERS as f64);
+                round(radius * sin, radius * cos).take(ROUND_CORNERS)
+            };
+            (0..=ROUND_CORNERS).flat_map(ring).collect()
+        }
         _ => return Ok(None),
     }))
 }

@@ -163,8 +163,8 @@ impl ShownData {
             goals: tour.plans.iter().map(|plan| place(plan.solution.query.goal.position)).collect(),
             predicted: ShownPrediction {
                 episodes: tour.predicted.episodes,
-                success: tour.predicted.rate(),
-                lower95: tour.predicted.lower95(),
+                success: tour.predicted_success(),
+                lower95: tour.predicted_lower95(),
                 sim_time_s: tour.predicted_time_s,
             },
             states: states(first),

@@ -48,6 +48,8 @@ pub(crate) fn run(args: &Abstract, seed: u64, json: bool) -> Result<Exit, Failur
     let count = |kind| OptionSet::synthesize(&file.rbvd, kind, &file.options).options().len();
 
     file.save(&args.out.join("abstraction.ron"))?;
+    // Another detector may have no picture of its own.
+    pictures::forget(&args.out.join("regions"));
     if let Some(criticality) = sharp.detection().and_then(|found| found.criticality.as_deref()) {
         let regions = pictures::regions_of(&file.rbvd);
         pictures::write(&args.out, "regions", &pictures::regions(&world.grid, criticality, &regions))?;

@@ -49,10 +49,15 @@ fn entries(dir: &Path, is_check: bool) -> Result<Vec<Entry>, Failure> {
     let mut worlds: Vec<String> = std::fs::read_dir(dir)
         .map_err(unreadable)?
         .filter_map(Result::ok)
-        .filter(|entry| entry.path().is_dir())
+        .filter(|entry| entry.path().is_dir() && holds_ron(&entry.path()))
         .filter_map(|entry| entry.file_name().into_string().ok())
         .collect();
     worlds.sort();
+    if is_check && worlds.is_empty() {
+        let whole = if holds_ron(dir) { "; the folder above it may be one" } else { "" };
+        let message = format!("{} is no library: no folder in it holds options{whole}", dir.display());
+        return Err(Failure::new("FILE_UNREADABLE", message));
+    }
     let mut entries = Vec::new();
     for world in worlds {
         let library = OptionLibrary::open(dir, &world)?;
@@ -69,4 +74,9 @@ fn entries(dir: &Path, is_check: bool) -> Result<Vec<Entry>, Failure> {
         }));
     }
     Ok(entries)
+}
+
+fn holds_ron(folder: &Path) -> bool {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    files.map(|file| file.path()).any(|file| file.extension().is_some_and(|ending| ending == "ron"))
 }

@@ -1,5 +1,7 @@
 //! `sharp map info|check|save`: what a map file says, whether a robot has room in it, and the same as a ROS map.
 
+use std::path::Path;
+
 use serde::Serialize;
 use sharp_bench::{MapReport, named};
 use sharp_plan::AbstractionSettings;
@@ -39,6 +41,19 @@ struct Saved {
     schema: &'static str,
     map: MapReport,
     file: String,
+}
+
+/// A map is a YAML file, and its image must not take the place of one that no such file owns.
+fn check_target(out: &Path) -> Result<(), Failure> {
+    let refused = |problem: String| Failure::new("USAGE", format!("--out is {}, {problem}", out.display()));
+    if !out.extension().is_some_and(|ending| ending == "yaml" || ending == "yml") {
+        return Err(refused("expected a name that ends in .yaml".to_owned()));
+    }
+    let image = out.with_extension("pgm");
+    if image.exists() && !out.exists() {
+        return Err(refused(format!("which would overwrite {}: choose another name", image.display())));
+    }
+    Ok(())
 }
 
 pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
@@ -90,6 +105,7 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
         }
         Map::Save { map, out } => {
             let map = input::map(map)?;
+            check_target(out)?;
             sharp_maps::save_ros(&map.grid, out)?;
             let (frame, file) = (map.grid.frame(), out.display().to_string());
             if json {

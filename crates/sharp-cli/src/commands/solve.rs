@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use sharp_bench::{
-    NamedProblem, SolveFolders, SolveReport, SolveSettings, Stopwatch, TimedMonitor, solve, solve_tour,
+    NamedProblem, SolveFolders, SolveReport, SolveSettings, Stopwatch, TimedMonitor, Verified, solve,
+    solve_tour,
 };
 use sharp_plan::{Method, Monitor, OptionLibrary, Tour};
 use sharp_space::Pose;
@@ -70,14 +71,17 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
         let is_time_up = monitor.should_stop();
         spinner.finish();
         hold_to(&mut solved.report, args.min_success);
-        if let Some(plan) = &solved.plan {
-            let (folder, tour) = (plan_folder(args, &problem)?, Tour::from(Arc::new(plan.clone())));
-            solved.write(&folder, &folder)?;
-            shown(args, (&tour, &problem.map), Some(solved.library()), (seed, &folder))?;
+        let folder = solved.plan.as_ref().map(|_| plan_folder(args, &problem)).transpose()?;
+        if let Some(folder) = &folder {
+            solved.write(folder, folder)?;
         }
         // Trainings that are kept apart are gone on with by the same call, which must find the library as this one did.
         if !(is_interrupted() && keeps_trainings) {
             solved.save_library()?;
+        }
+        if let (Some(plan), Some(folder)) = (&solved.plan, &folder) {
+            let tour = Tour::from(Arc::new(plan.clone()));
+            shown(args, (&tour, &problem.map), Some(solved.library()), (seed, folder))?;
         }
         (solved.report, is_time_up)
     } else {
@@ -226,19 +230,24 @@ fn print_report(report: &SolveReport) {
     let ends: Vec<usize> =
         report.goals.iter().scan(0, |end, goal| Some(std::mem::replace(end, *end + goal.legs))).collect();
     let in_tenths = |seconds: Option<f64>| seconds.map_or("-".to_owned(), |seconds| format!("{seconds:.1}"));
+    // Composed odds have no runs of legs.
+    let is_run = report.predicted.as_ref().is_none_or(|predicted| predicted.basis == "runs");
+    let arrivals = |count: Verified| match is_run {
+        true => format!("succeeds {:>4}/{:<4} on arrival  ", count.successes, count.episodes),
+        false => String::new(),
+    };
     for (index, option) in report.plan.iter().enumerate() {
         if let Some(number) = ends.iter().position(|&first| first == index) {
             let [x, y] = report.goals[number].goal;
             say!("to ({x}, {y}):");
         }
         say!(
-            "  {:<14} {:>5.1} m  time {:>5} s  cost {:>6} s  succeeds {:>4}/{:<4} on arrival  {}{}",
+            "  {:<14} {:>5.1} m  time {:>5} s  cost {:>6} s  {}{}{}",
             option.option,
             option.length_m,
             in_tenths(option.time_s),
             in_tenths(option.cost_s),
-            option.on_arrival.successes,
-            option.on_arrival.episodes,
+            arrivals(option.on_arrival),
             option.policy,
             if option.reused { ", reused" } else { "" }
         );

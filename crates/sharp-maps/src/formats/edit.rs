@@ -3,7 +3,7 @@
 use sharp_space::{Cell, GridFrame, Occupancy, OccupancyGrid, Vector};
 
 use super::error::MapError;
-use super::load::MapFile;
+use super::load::{MapFile, SIDE_MAX};
 
 /// How far a mask's cell may reach into a map's cell without touching it, in cells: frames are not exact.
 const TOUCH: f64 = 1e-6;
@@ -66,14 +66,15 @@ impl MapFile {
         self.set_grid(frame, cells)
     }
 
-    /// The grid, its cells divided so that none is wider than `most_m` metres, as far as 16 million cells allow:
-    /// the same map drawn finer.
+    /// The grid, its cells divided so that none is wider than `most_m` metres, as far as 16 million cells and the longest side
+    /// of a grid allow: the same map drawn finer.
     #[must_use]
     pub fn grid_with_cells(&self, most_m: f64) -> OccupancyGrid {
         let coarse = *self.grid.frame();
         let wanted = (coarse.resolution_m / most_m - 1e-9).ceil().max(1.0);
         let allowed = (REFINED_MAX_CELLS as f64 / coarse.len() as f64).sqrt().max(1.0);
-        let factor = wanted.min(allowed).floor() as usize;
+        let longest = SIDE_MAX / coarse.width.max(coarse.height);
+        let factor = (wanted.min(allowed).floor() as usize).min(longest);
         if factor == 1 {
             return self.grid.clone();
         }

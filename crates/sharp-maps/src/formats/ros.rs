@@ -167,7 +167,8 @@ pub(crate) fn image_of(path: &Path) -> Option<PathBuf> {
 
 /// A warning if the grey that map savers write for unknown cells is there and counts as free.
 fn unknown_as_free(file: &str, picture: &GreyImage, rules: &GreyRules) -> Option<String> {
-    let counts_as_free = rules.mode != GreyMode::Raw && !rules.negate && rules.value_of(UNKNOWN_GREY) == 0;
+    let counts_as_free =
+        rules.mode == GreyMode::Trinary && !rules.negate && rules.value_of(UNKNOWN_GREY) == 0;
     (counts_as_free && picture.grey.contains(&UNKNOWN_GREY)).then(|| {
         format!(
             "{file}: with free_thresh {} the grey {UNKNOWN_GREY} counts as free, map savers write it for unknown cells; \

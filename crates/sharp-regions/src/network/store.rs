@@ -122,6 +122,10 @@ pub(crate) fn from_bytes(bytes: &[u8], device: &Device) -> Result<(UNet, ModelCa
     let broken = |error: safetensors::SafeTensorError| ModelError::Broken(error.to_string());
     let card = read_card(bytes)?;
     let tensors = SafeTensors::deserialize(bytes).map_err(broken)?;
+    // A damaged card must not make it take gigabytes.
+    if card.network.least_weights() > bytes.len() / size_of::<f32>() {
+        return Err(ModelError::Network(card.network));
+    }
     let network = UNet::init(card.network, device, &mut card.seed.stream("weights", 0));
     let mut weights = Weights::default();
     network.visit(&mut weights);
@@ -256,6 +260,10 @@ mod tests {
         let other = ModelCard { network: UNetConfig { width: 3, ..card.network }, ..card.clone() };
         let wider = refusal(&to_bytes(&network, &other, &BTreeMap::new()));
         assert!(wider.contains("expected f32"), "{wider}");
+        let giant = UNetConfig { width: 512, levels: 6, ..card.network };
+        let giant =
+            refusal(&to_bytes(&network, &ModelCard { network: giant, ..card.clone() }, &BTreeMap::new()));
+        assert!(giant.contains("describes a network of width 512, 6 levels"), "{giant}");
         let newer = ModelCard { format: 2, ..card };
         assert!(refusal(&to_bytes(&network, &newer, &BTreeMap::new())).contains("format 2"), "format");
     }

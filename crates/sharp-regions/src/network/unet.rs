@@ -69,6 +69,12 @@ impl UNetConfig {
         self.patch << (self.levels - 1)
     }
 
+    /// Fewer weights than any network of this shape has: those of its widest convolution from one plane to another.
+    pub(crate) const fn least_weights(&self) -> usize {
+        let widest = self.width << (self.levels - 1);
+        9 * widest * widest
+    }
+
     /// Returns true if a network of this shape can be built.
     pub(crate) fn is_sound(&self) -> bool {
         (1..=512).contains(&self.width) && (1..=6).contains(&self.levels) && matches!(self.patch, 1 | 2)
