@@ -447,8 +447,13 @@ fn a_learnt_building_answers_solves_and_serves() {
         "{\"goal\":[6.1,0.5]}\n{\"pose\":[2.5,3.0,0.0]}\n{\"route\":[[4.0,5.0],[10.0,5.0]]}\n{\"pose\":[-3.0,0.0,0.0]}\n",
         "{\"cancel\":true}\n{\"pose\":[2.5,3.0,0.0]}\n"
     );
-    child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
+    // A robot that does not move is given up, and goes on once somebody has moved it.
+    let stuck = "{\"pose\":[2.5,3.0,0.0],\"speed\":0,\"yaw_rate\":0}\n".repeat(200);
+    let lines = format!("{lines}{{\"goal\":[10.0,3.5]}}\n{stuck}{{\"pose\":[3.0,3.0,0.0]}}\n");
+    let mut stdin = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || stdin.write_all(lines.as_bytes()).unwrap());
     let output = child.wait_with_output().unwrap();
+    writer.join().unwrap();
     let said: Vec<Value> = String::from_utf8_lossy(&output.stdout)
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
@@ -473,7 +478,9 @@ fn a_learnt_building_answers_solves_and_serves() {
         "cancelled",
         "no_plan",
     ];
-    assert_eq!(words, expected, "{said:?}");
+    assert_eq!(words[..expected.len()], expected, "{said:?}");
+    assert_eq!(words[words.len() - 2..], ["lost", "running"], "{:?}", &said[said.len() - 2..]);
+    assert!(words.iter().filter(|word| **word == "recovering").count() <= 10, "{words:?}");
     assert!(said[5]["plan"]["reason"].as_str().unwrap().contains("goal"), "{}", said[5]);
     assert!(said[2]["odds"]["success"].as_f64() > Some(0.8), "{}", said[2]);
     let left = |line: usize| said[line]["odds"]["time_s"].as_f64().unwrap();

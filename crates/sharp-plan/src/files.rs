@@ -206,6 +206,21 @@ pub(crate) const fn is_zero(count: &u32) -> bool {
 mod tests {
     use super::*;
 
+    #[cfg(unix)]
+    #[test]
+    fn links_and_devices_stay_what_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        fs::write(&file, "before").unwrap();
+        write_atomic(&link, b"after").unwrap();
+        assert!(link.is_symlink() && fs::read(&file).unwrap() == b"after");
+        let device = folder.path().join("device");
+        std::os::unix::fs::symlink("/dev/null", &device).unwrap();
+        write_atomic(&device, b"gone").unwrap();
+        assert!(device.is_symlink() && !fs::metadata("/dev/null").unwrap().is_file());
+    }
+
     #[test]
     fn every_flipped_byte_is_noticed() {
         let folder = tempfile::tempdir().unwrap();

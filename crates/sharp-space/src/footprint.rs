@@ -467,6 +467,8 @@ mod tests {
         let back = grown.grown(-0.1).unwrap();
         assert!((back.half_length_m() - 0.6).abs() < 1e-9, "{back:?}");
         assert!(nose.grown(-0.2).is_err(), "nothing is left around the reference point");
+        let diamond = polygon(&[(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]).unwrap();
+        assert!(diamond.grown(-1.5).is_err(), "it must not turn inside out");
         assert_eq!(Footprint::disc(0.2).unwrap().grown(0.1).unwrap().half_width_m(), 0.2 + 0.1);
     }
 }

@@ -238,13 +238,13 @@ mod tests {
     fn a_damaged_state_is_refused() {
         let refusal = |bytes: &[u8]| read_saved(bytes, ("here", 1)).expect_err("damaged").to_string();
         let saved = |stage, state: &[u8]| saved(("here", stage), state);
-        assert_eq!(refusal(b"sharp"), "saved state: no first line");
+        assert!(refusal(b"sharp").contains("no first line"), "cut short");
         assert!(refusal(b"sharp.prior.state/0 0 abc\n").contains("format"), "another version");
         let other = super::saved(("there", 0), b"state");
-        assert_eq!(refusal(&other), "saved state: another robot, recipe or seed");
+        assert!(refusal(&other).contains("another robot, recipe or seed"), "another robot");
         let mut bytes = saved(0, b"state");
         bytes.push(b'!');
-        assert_eq!(refusal(&bytes), "saved state: the bytes do not have their hash");
-        assert_eq!(refusal(&saved(3, b"state")), "saved state: stage 3, the recipe has 1");
+        assert!(refusal(&bytes).contains("the bytes do not have their hash"), "damaged");
+        assert!(refusal(&saved(3, b"state")).contains("stage 3, the recipe has 1"), "another recipe");
     }
 }

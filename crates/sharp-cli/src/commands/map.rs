@@ -46,7 +46,7 @@ struct Saved {
 /// A map is a YAML file, and its image must not take the place of one that no such file owns.
 fn check_target(out: &Path) -> Result<(), Failure> {
     let refused = |problem: String| Failure::new("USAGE", format!("--out is {}, {problem}", out.display()));
-    if !out.extension().is_some_and(|ending| ending == "yaml" || ending == "yml") {
+    if out.extension().is_some_and(|ending| ending != "yaml" && ending != "yml") {
         return Err(refused("expected a name that ends in .yaml".to_owned()));
     }
     let image = out.with_extension("pgm");
