@@ -28,13 +28,13 @@ const METHODS: [&str; 3] = ["sharp", "track", "mppi"];
 
 /// What the executions of one method on one problem came to.
 #[derive(Clone, Copy)]
-struct Driven {
+struct MethodScore {
     success: f64,
     /// Mean driving time of the successes; 0 without any.
     time_s: f64,
 }
 
-impl From<BaselineReport> for Driven {
+impl From<BaselineReport> for MethodScore {
     fn from(report: BaselineReport) -> Self {
         Self { success: report.success_rate, time_s: report.mean_sim_time_s }
     }
@@ -69,8 +69,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let settings = BaselineSettings::new(kind, episodes, seed + number as u64);
             measure(&place.problem(query), &settings, Stopwatch::start("plan"), &())
         });
-        let (track, mppi) = (Driven::from(track?), Driven::from(mppi?));
-        let peers = [track, mppi].map(|Driven { success, time_s }| format!("{success:.3} {time_s:.1}"));
+        let (track, mppi) = (MethodScore::from(track?), MethodScore::from(mppi?));
+        let peers = [track, mppi].map(|MethodScore { success, time_s }| format!("{success:.3} {time_s:.1}"));
         let (mut sharp, _) = place.open(&settings, None)?;
         match sharp.solve(query, &())? {
             Answer::Solved(plan) => {
@@ -108,11 +108,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Drives `plan` as the project measures plans.
-fn executed(plan: Plan, episodes: u32, seed: Seed) -> Driven {
+fn executed(plan: Plan, episodes: u32, seed: Seed) -> MethodScore {
     let plan = Arc::new(plan);
     let executions = run(&plan, &RunSettings::new(&plan, episodes, seed), &|| 0.0);
     let reached = executions.iter().filter(|one| one.end == EpisodeEnd::Reached);
     let times: Vec<f64> = reached.map(|one| one.record.time_s).collect();
     let time_s = times.iter().sum::<f64>() / times.len().max(1) as f64;
-    Driven { success: success(&executions).rate(), time_s }
+    MethodScore { success: success(&executions).rate(), time_s }
 }

@@ -254,8 +254,8 @@ pub(crate) struct Solve {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Runs of the whole plan that its predicted success is counted on; auto stops as soon as the 95 % interval is two
-    /// points wide, at the latest after 1000; 0 composes it of what the library knows of options and
-    /// hand-overs, and runs a plan only where that promises less than 90 %.
+    /// points wide, at the latest after 1000; 0 composes it of what the library knows of options and hand-overs, and runs
+    /// a plan only where that promises less than 95 %.
     #[arg(long, default_value = "auto", value_name = "N|auto")]
     pub(crate) verify: String,
     /// Stop after so many seconds of wall time, with the best plan so far; what was learnt is kept.

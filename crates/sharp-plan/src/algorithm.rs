@@ -36,7 +36,7 @@ const COMPOSED_WELL: [f64; 2] = [0.95, 0.98];
 /// And only if start and goal are no further apart, metres: the guide of a longer way takes longer than the rest of an answer.
 const COMPOSED_DIRECT_M: f64 = 25.0;
 /// A composed plan that succeeds less often than this is compared with one that the usual method makes and runs.
-const COMPOSED_USABLE: f64 = 0.9;
+const COMPOSED_USABLE: f64 = 0.95;
 /// Composed plans that are longer than this many times the shortest way are compared with the direct way too.
 const DETOUR: f64 = 1.35;
 
