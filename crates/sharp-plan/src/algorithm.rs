@@ -102,8 +102,8 @@ fn answer(
         Outcome::Stopped => false,
     };
     if let Some(usual) = method.usual().filter(|_| is_poor) {
-        // Repairs would be for this problem alone: an option of the library that changed would no longer be the one whose
-        // hand-overs were driven, and the answer to a question would depend on those before it.
+        // What this pass learns is for this problem alone: an option of the library that changed would no longer be the one
+        // whose hand-overs were driven, and the answer to a question would depend on those before it.
         policies.leave_library();
         let usual = PlanningProblem { method: &usual, ..*problem };
         let other = algorithm_1(&usual, abstraction, policies, known)?;
