@@ -218,8 +218,8 @@ impl RouteGraph {
     fn join(&mut self, world: &World, a: usize, b: usize) {
         let (from, to) = (self.nodes[a], self.nodes[b]);
         let length_m = (to - from).norm();
-        let fits = length_m <= SHORT_M || (has_room(world, from, to) && has_room(world, to, from));
-        if length_m < SAME_PLACE_M || !fits || !is_line_free(&world.grid, from, to) {
+        let fits = || length_m <= SHORT_M || (has_room(world, from, to) && has_room(world, to, from));
+        if length_m < SAME_PLACE_M || !is_line_free(&world.grid, from, to) || !fits() {
             return;
         }
         let time_s = length_m / (0.5 * world.robot.max_speed_mps);

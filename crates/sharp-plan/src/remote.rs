@@ -166,7 +166,8 @@ impl RemoteDriver {
     /// The same for a robot that is now in `state`.
     pub fn answer_in(&mut self, state: RobotState) -> Instruction {
         let before = std::mem::replace(&mut self.state, state);
-        let driven_max_m = 2.0 * self.robot.max_speed_mps * ActionSettings::default().action_s + CARRIED_M;
+        let driven_max_m =
+            CARRIED_FACTOR * self.robot.max_speed_mps * ActionSettings::default().action_s + CARRIED_M;
         let is_carried = before.pose.distance_m(&state.pose) > driven_max_m;
         let is_elsewhere = |at: Pose| {
             let turned_rad = at.heading.turn_to(state.pose.heading).abs();

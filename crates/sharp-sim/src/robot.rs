@@ -86,6 +86,16 @@ pub enum Drive {
 }
 
 impl Drive {
+    /// See [`RobotModel::yaw_gain`].
+    pub(crate) fn yaw_gain(&self) -> f64 {
+        match *self {
+            Self::Differential { track_m, wheelbase_m } => {
+                track_m * track_m / (track_m * track_m + wheelbase_m * wheelbase_m)
+            }
+            Self::Ackermann { .. } => 1.0,
+        }
+    }
+
     /// What it is called in results: `differential` or `ackermann`.
     #[must_use]
     pub const fn name(&self) -> &'static str {
@@ -217,12 +227,7 @@ impl RobotModel {
     /// track² / (track² + wheelbase²): 0.554 for the Husky. A steered robot rolls: 1.
     #[must_use]
     pub fn yaw_gain(&self) -> f64 {
-        match self.drive {
-            Drive::Differential { track_m, wheelbase_m } => {
-                track_m * track_m / (track_m * track_m + wheelbase_m * wheelbase_m)
-            }
-            Drive::Ackermann { .. } => 1.0,
-        }
+        self.drive.yaw_gain()
     }
 
     /// Distance between front and rear axle, metres.

@@ -174,9 +174,8 @@ impl DriveText {
 fn fastest_turn(drive: &Drive, top_mps: f64) -> f64 {
     match *drive {
         // Skidding wheels turn the body by less than their speeds ask for: see `RobotModel::yaw_gain`.
-        Drive::Differential { track_m, wheelbase_m } => {
-            let yaw_gain = track_m * track_m / (track_m * track_m + wheelbase_m * wheelbase_m);
-            (yaw_gain * 2.0 * top_mps / track_m).min(YAW_RATE_MAX_RADPS)
+        Drive::Differential { track_m, .. } => {
+            (drive.yaw_gain() * 2.0 * top_mps / track_m).min(YAW_RATE_MAX_RADPS)
         }
         Drive::Ackermann { wheelbase_m, max_steer_rad, .. } => {
             top_mps * trig::tan(max_steer_rad) / wheelbase_m
