@@ -228,8 +228,10 @@ fn a_folder_that_cannot_be_written_is_named() {
     let error = save_ros(&grid, &folder.path().join("missing/m.yaml")).expect_err("no such folder");
     assert_eq!(error.code(), "MAP_WRITE", "{error}");
     assert!(error.to_string().contains("missing/m.pgm: cannot be written"), "{error}");
-    let error = save_ros(&grid, &folder.path().join("m.pgm")).expect_err("image and YAML in one file");
-    assert!(error.to_string().contains("ending is \"pgm\", must be .yaml"), "{error}");
+    for (name, found) in [("m.pgm", "\"pgm\""), ("m", "missing"), ("m.map", "\"map\"")] {
+        let error = save_ros(&grid, &folder.path().join(name)).expect_err("nothing would read it");
+        assert!(error.to_string().contains(&format!("ending is {found}, must be .yaml or .yml")), "{error}");
+    }
 }
 
 #[test]
@@ -248,6 +250,7 @@ fn broken_fields_are_named_with_their_value() {
         ("resolution", "resolution: -0.05", "resolution is -0.05"),
         ("resolution", "resolution: 1e-10", "resolution is 0.0000000001"),
         ("resolution", "resolution: 1e9", "resolution is 1000000000"),
+        ("resolution", "resolution: 1e300", "resolution is 1e300,"),
         ("resolution", "resolution: 5 cm", "resolution is \"5 cm\""),
         ("resolution", "resolution: {a: 1}", "resolution is a mapping"),
         ("resolution", "resolution: true", "resolution is true"),
@@ -293,7 +296,7 @@ fn broken_yaml_names_the_file_and_the_reason() {
         ("bytes that are no text", b"image: \xff\xfe", "byte 7 is not UTF-8"),
         ("a bomb of aliases", laughs.as_bytes(), "is no valid YAML"),
         ("deep nesting", nested.as_bytes(), "is no valid YAML"),
-        ("two documents", b"a: 1\n---\nb: 2\n", "is no valid YAML"),
+        ("two documents", b"a: 1\n---\nb: 2\n", "holds several YAML documents"),
         ("an open quote", b"image: \"map.pgm\n", "is no valid YAML"),
     ];
     for (label, yaml, says) in cases {

@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use sharp_plan::{
-    AbstractionFile, Answer, ComposedOdds, Instruction, Plan, Query, Reading, RemoteDriver, RemoteStatus,
-    Sharp, end_of,
+    AbstractionFile, Answer, ComposedOdds, Instruction, MOVED, Plan, Query, Reading, RemoteDriver,
+    RemoteStatus, Sharp, end_of, is_elsewhere, is_placed,
 };
 use sharp_sim::RobotState;
-use sharp_space::{Occupancy, Pose};
+use sharp_space::Pose;
 
 use crate::error::BenchError;
 use crate::learn::NamedWorld;
@@ -77,8 +77,6 @@ pub struct Dispatcher {
     recoveries: (u32, Pose),
 }
 
-/// A lost robot that moved or turned more than this may have a plan again, metres and radians.
-const MOVED: (f64, f64) = (0.05, 0.1);
 /// So many new plans without leaving a place of this size leave a robot lost, metres and radians.
 const RECOVERIES_MAX: u32 = 10;
 const STUCK_WITHIN: (f64, f64) = (0.2, 0.8);
@@ -154,7 +152,7 @@ impl Dispatcher {
     /// If the library cannot be written.
     pub fn drive(&mut self, reading: &Reading) -> Result<Vec<DispatchLine>, BenchError> {
         let state = reading.state(&self.place.world.robot, self.state.as_ref());
-        if !self.is_placed(&state.pose) {
+        if !is_placed(&self.place.world, &state.pose) {
             // What it knew of the robot before stays, for the next pose may be a real one again.
             return Ok(vec![standing("lost")]);
         }
@@ -278,12 +276,6 @@ impl Dispatcher {
         let (speed, option) = (told.speed_mps, told.option.to_string());
         DispatchLine::Reply(DispatchReply { waypoint, speed, option, status, odds })
     }
-
-    /// Returns true if a robot can be at `pose`: its middle is in the free space of the map.
-    fn is_placed(&self, pose: &Pose) -> bool {
-        let grid = &self.place.world.grid;
-        grid.frame().cell_at(pose.position).is_some_and(|cell| grid.get(cell) == Occupancy::Free)
-    }
 }
 
 impl Driving {
@@ -291,11 +283,6 @@ impl Driving {
         let (odds, plan) = (Some(plan.solution.odds()), Arc::new(plan));
         Self { driver: RemoteDriver::from_state(vec![Arc::clone(&plan)], state, true), plan, odds }
     }
-}
-
-/// Whether `now` is further from `at` than so many metres or radians.
-fn is_elsewhere(at: &Pose, now: &Pose, (moved_m, turned_rad): (f64, f64)) -> bool {
-    at.distance_m(now) > moved_m || at.heading.turn_to(now.heading).abs() > turned_rad
 }
 
 fn odds(plan: &Plan) -> Odds {

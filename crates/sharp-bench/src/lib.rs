@@ -46,6 +46,7 @@ mod reports;
 mod result;
 mod robot_import;
 mod serve_line;
+mod shell;
 mod show;
 mod solve;
 mod speed_mask;
@@ -90,6 +91,7 @@ pub use result::{
 };
 pub use robot_import::{ImportError, ImportWishes, ImportedField, ImportedRobot, import_robot};
 pub use serve_line::{ServeLine, parse_pose_line, parse_serve_line};
+pub use shell::shell_word;
 pub use show::PlanPage;
 pub use solve::{AbstractionRequest, SolveFolders, SolveSettings, Solved, prepare, solve};
 pub use speed_mask::{SpeedMaskError, SpeedRule, speed_limits};

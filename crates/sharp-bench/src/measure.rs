@@ -232,7 +232,11 @@ impl Measurement<'_> {
         BaselineReport {
             schema: "sharp.baseline/1",
             method: settings.kind.name(),
-            status: if measured.is_some() { "driven" } else { "no_plan" },
+            status: match measured {
+                None => "no_plan",
+                Some(_) if episodes < settings.episodes => "timeout",
+                Some(_) => "driven",
+            },
             robot: problem.world.robot.name.clone(),
             noise: problem.noise.clone(),
             simulator: settings.simulator.to_string(),

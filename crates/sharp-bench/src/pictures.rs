@@ -52,9 +52,9 @@ pub fn write_kept(
     Ok(())
 }
 
-/// Removes the picture that [`write_kept`] kept at `kept`, if it can be removed.
-pub fn forget(kept: &Path) {
-    for path in EXTENSIONS.map(|extension| kept.with_extension(extension)) {
+/// Removes the picture at `picture`, a path without extension, if there is one and it can be removed.
+pub fn forget(picture: &Path) {
+    for path in EXTENSIONS.map(|extension| picture.with_extension(extension)) {
         let _ = std::fs::remove_file(path);
     }
 }

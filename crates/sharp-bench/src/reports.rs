@@ -403,7 +403,7 @@ pub struct BaselineReport {
     pub schema: &'static str,
     /// The name of the baseline.
     pub method: &'static str,
-    /// `driven`, or `no_plan` if no path leads to the goal.
+    /// `driven`, `no_plan` if no path leads to the goal, or `timeout` if it was stopped before the last execution.
     pub status: &'static str,
     /// The name of the robot.
     pub robot: String,
@@ -415,7 +415,7 @@ pub struct BaselineReport {
     pub seed: u64,
     /// The map.
     pub map: MapReport,
-    /// Executions.
+    /// Executions that came to an end: with the status `timeout` fewer than were asked for.
     pub episodes: u32,
     /// Executions that reached the goal.
     pub successes: u32,

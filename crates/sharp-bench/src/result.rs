@@ -48,9 +48,9 @@ pub struct ResultLine {
     pub trial: u32,
     /// Root of all randomness.
     pub seed: u64,
-    /// `solved`, `no_plan` or `timeout`; `driven` for the baselines.
+    /// `solved`, `no_plan` or `timeout`; `driven`, `no_plan` or `timeout` for the baselines.
     pub status: String,
-    /// Executions.
+    /// Executions; of a baseline that was out of time, those that came to an end.
     pub episodes: u32,
     /// Executions that reached the goal.
     pub successes: u32,

@@ -73,6 +73,10 @@ pub fn parse_serve_line(text: &str) -> Result<ServeLine, String> {
 }
 
 fn parse_line(text: &str) -> Result<LineText, String> {
+    // A list would be taken for the values of the keys, in their order.
+    if !text.trim_start().starts_with('{') {
+        return Err("expected a JSON object".to_owned());
+    }
     serde_json::from_str(text).map_err(|error| error.to_string())
 }
 
@@ -119,7 +123,10 @@ mod tests {
         let goals = vec![Pose::new(1.0, 2.0, 0.0), Pose::new(3.0, 4.0, 1.5)];
         assert_eq!(parse_serve_line(r#"{"route":[[1,2],[3,4,1.5]]}"#), Ok(ServeLine::Drive(goals)));
         for (line, reason) in [
-            ("", "EOF"),
+            ("", "expected a JSON object"),
+            ("[null,null,[1,2,3],null,null,null]", "expected a JSON object"),
+            ("\"x\"", "expected a JSON object"),
+            ("{", "EOF"),
             ("{}", "expected one of goal, route, pose and cancel"),
             (r#"{"cancel":false}"#, "expected true"),
             (r#"{"route":[]}"#, "route is empty"),

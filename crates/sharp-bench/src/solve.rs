@@ -20,6 +20,7 @@ use crate::reports::{MapReport, SolveReport, Verified};
 use crate::result::default_regions;
 use crate::stopwatch::TimedMonitor;
 use crate::times::{Reuse, SolveTimes};
+use crate::tour::{forget_plans, has_tour};
 use sharp_drive::World;
 
 /// The status of a solve that was stopped without a plan.
@@ -229,6 +230,15 @@ impl SolveSettings {
     }
 }
 
+/// Removes what was driven with an earlier plan in `folder`, as far as it can be removed: beside another plan it would be
+/// taken for that one's.
+pub(crate) fn forget_drives(folder: &Path) {
+    for file in ["run.json", "show.html"] {
+        let _ = std::fs::remove_file(folder.join(file));
+    }
+    pictures::forget(&folder.join("run"));
+}
+
 /// `report` with what `answer` says.
 pub(crate) fn answered(report: SolveReport, answer: Answer) -> (SolveReport, Option<Plan>) {
     match answer {
@@ -276,8 +286,8 @@ pub(crate) fn blank_report(
 }
 
 impl Solved {
-    /// Writes the plan, its map, its pictures and the report into `folder`, which the report calls `name`. Does nothing
-    /// without a plan.
+    /// Writes the plan, its map, its pictures and the report into `folder`, which the report calls `name`, in place of an
+    /// earlier plan and of what was driven with it. Does nothing without a plan.
     ///
     /// # Errors
     /// If a picture cannot be drawn or a file cannot be written.
@@ -285,7 +295,12 @@ impl Solved {
         let Self { report, plan, file, picture, .. } = self;
         let Some(plan) = plan else { return Ok(()) };
         report.plan_dir = Some(name.display().to_string());
+        let had_tour = has_tour(folder);
+        forget_drives(folder);
         plan.save(folder, file)?;
+        if had_tour {
+            forget_plans(folder, 0);
+        }
         let grid = &plan.world.grid;
         sharp_maps::save_ros(grid, &folder.join("map.yaml"))?;
         let (of_states, of_plan) = rayon::join(

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use sharp_plan::{Monitor, Phase, Query, Tour, end_of, write_atomic};
+use sharp_plan::{Monitor, OptionLibrary, Phase, Query, Tour, end_of, write_atomic};
 use sharp_space::Pose;
 
 use crate::error::BenchError;
@@ -11,9 +11,26 @@ use crate::json::to_json;
 use crate::named::NamedProblem;
 use crate::pictures;
 use crate::reports::{GoalReport, Predicted, SolveReport};
-use crate::solve::{SolveFolders, SolveSettings, Solved, solve, with_recovery};
+use crate::solve::{SolveFolders, SolveSettings, Solved, forget_drives, solve, with_recovery};
 use crate::stopwatch::TimedMonitor;
 use crate::times::Reuse;
+
+/// The files in the folder of a plan, but for its weights.
+const PLAN_FILES: [&str; 13] = [
+    "abstraction.png",
+    "abstraction.ron",
+    "abstraction.svg",
+    "map.pgm",
+    "map.yaml",
+    "plan.png",
+    "plan.ron",
+    "plan.svg",
+    "run.json",
+    "run.png",
+    "run.svg",
+    "show.html",
+    "solve.json",
+];
 
 /// What solving for several goals gave.
 #[derive(Debug)]
@@ -109,17 +126,28 @@ fn whole(solved: &[Solved], last: &Solved, goals: &[Pose], tour: Option<&Tour>) 
 }
 
 impl SolvedTour {
-    /// Writes the plans into folders in `folder`, which the report calls `name`, and what they are together beside them.
-    /// Does nothing without a plan to every goal.
+    /// The options learnt so far.
+    #[must_use]
+    pub fn library(&self) -> Option<&OptionLibrary> {
+        self.solved.last().map(Solved::library)
+    }
+
+    /// Writes the plans into folders in `folder`, which the report calls `name`, and what they are together beside them, in
+    /// place of earlier plans and of what was driven with them. Does nothing without a plan to every goal.
     ///
     /// # Errors
     /// If a picture cannot be drawn or a file cannot be written.
     pub fn write(&mut self, folder: &Path, name: &Path) -> Result<(), BenchError> {
         let Self { report, tour, solved } = self;
         let Some(tour) = tour else { return Ok(()) };
+        let had_tour = has_tour(folder);
+        forget_drives(folder);
         Tour::remove(folder)?;
         for (index, one) in solved.iter_mut().enumerate() {
             one.write(&Tour::plan_folder(folder, index), &Tour::plan_folder(name, index))?;
+        }
+        if had_tour {
+            forget_plans(folder, solved.len());
         }
         report.plan_dir = Some(name.display().to_string());
         sharp_maps::save_ros(&tour.plans[0].world.grid, &folder.join("map.yaml"))?;
@@ -128,4 +156,28 @@ impl SolvedTour {
         write_atomic(&folder.join("solve.json"), (to_json(report) + "\n").as_bytes())?;
         Ok(())
     }
+}
+
+/// Returns true if `folder` holds several plans in a row.
+pub(crate) fn has_tour(folder: &Path) -> bool {
+    folder.join("tour.ron").exists()
+}
+
+/// Removes the plans from number `first` on, counted from 0, of an earlier tour in `folder`, as far as they can be removed.
+/// What others put beside them stays.
+pub(crate) fn forget_plans(folder: &Path, first: usize) {
+    let folders = (first..).map(|index| Tour::plan_folder(folder, index));
+    for folder in folders.take_while(|folder| Tour::is_in(folder)) {
+        let files = std::fs::read_dir(&folder).into_iter().flatten().flatten();
+        for file in files.map(|entry| entry.path()).filter(|file| is_of_plan(file)) {
+            let _ = std::fs::remove_file(file);
+        }
+        let _ = std::fs::remove_dir(folder);
+    }
+}
+
+/// Returns true if `file` is a plan or one of those that are written beside it. Weights are named by a hash of 32 digits.
+fn is_of_plan(file: &Path) -> bool {
+    let name = file.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    PLAN_FILES.contains(&name) || name.strip_suffix(".safetensors").is_some_and(|hash| hash.len() == 32)
 }

@@ -26,11 +26,11 @@ pub(crate) struct Cli {
     pub(crate) json: bool,
     /// Root of all randomness: equal seeds give equal bytes, from equal libraries. The default library keeps what
     /// earlier solves learnt, so a second solve may differ; --library none starts from nothing.
-    #[arg(long, global = true, default_value_t = 1, value_name = "N")]
+    #[arg(long, global = true, default_value_t = 1, value_name = "N", allow_negative_numbers = true)]
     pub(crate) seed: u64,
     /// Worker threads; the result does not depend on it [default: all cores].
-    #[arg(long, global = true, value_name = "N")]
-    pub(crate) threads: Option<usize>,
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) threads: Option<u32>,
     #[command(subcommand)]
     pub(crate) command: Subcommands,
 }
@@ -98,7 +98,7 @@ pub(crate) struct MapArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ReadingArgs {
     /// Metres a cell, for files that do not say.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub(crate) resolution: Option<f64>,
     /// What unknown cells count as.
     #[arg(long, value_enum, default_value_t = Unknown::Blocked)]
@@ -219,10 +219,10 @@ pub(crate) struct Solve {
     #[arg(long, value_name = "X,Y[,YAW]", allow_hyphen_values = true)]
     pub(crate) via: Vec<String>,
     /// Arrive in the goal's heading, at most so many radians off, or degrees as in 20deg [default: any heading will do].
-    #[arg(long, value_name = "RAD", conflicts_with = "via", value_parser = radians)]
+    #[arg(long, value_name = "RAD", conflicts_with = "via", value_parser = radians, allow_negative_numbers = true)]
     pub(crate) goal_heading_tolerance: Option<f64>,
     /// Exit with 1 if the plan predicts less success than this; it is written all the same.
-    #[arg(long, value_name = "P", default_value_t = 0.0)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) min_success: f64,
     /// How policies are learnt.
     #[arg(long, value_enum, default_value_t = Learning::Fast)]
@@ -242,7 +242,7 @@ pub(crate) struct Solve {
     pub(crate) cost_update: Switch,
     /// What a failure counts for beside the seconds of a success: more makes plans safer and slower
     /// [default: 1000; 0 with --learning paper and paper-tuned].
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) failure_cost: Option<f64>,
     /// How guides are planned: along the ridge of clearance, or by the paper's learn-and-link trees.
     #[arg(long, value_enum, default_value_t = Guide::Ridge)]
@@ -256,10 +256,10 @@ pub(crate) struct Solve {
     /// Runs of the whole plan that its predicted success is counted on; auto stops as soon as the 95 % interval is two
     /// points wide, at the latest after 1000; 0 composes it of what the library knows of options and hand-overs, and runs
     /// a plan only where that promises less than 95 %.
-    #[arg(long, default_value = "auto", value_name = "N|auto")]
+    #[arg(long, default_value = "auto", value_name = "N|auto", allow_negative_numbers = true)]
     pub(crate) verify: String,
     /// Stop after so many seconds of wall time, with the best plan so far; what was learnt is kept.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) time_limit: Option<f64>,
     /// Drive the plan and write a page to look at: map, options, drives that move, weak places [default file: show.html
     /// in the plan's folder].
@@ -489,6 +489,9 @@ pub(crate) enum PriorCommand {
     /// Fit the model of what it costs to drive on a prior.
     Cost(PriorCost),
     /// How often it holds on held-out kinds of map, beside the followers, and how well its cost is known.
+    ///
+    /// The rows are numbered from 00: the prior becomes more careful with each number; a follower (constant speed) or a
+    /// profiled one (slower before bends and in narrow places) has another speed or way to steer with each.
     Score(PriorScore),
 }
 
@@ -650,8 +653,9 @@ pub(crate) struct Baseline {
     /// What touching a wall means: the end of the episode, or a bump after which it goes on.
     #[arg(long, value_enum, default_value_t = Collisions::End)]
     pub(crate) collisions: Collisions,
-    /// Stop learning, or give up driving, after so many seconds of wall time [default: 2400].
-    #[arg(long, value_name = "S")]
+    /// Stop learning, or give up driving, after so many seconds of wall time [default: 2400]. Executions that came to
+    /// an end are counted; if that are not all, the exit code is 1.
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) time_limit: Option<f64>,
     /// Samples of one plan of rrt; a plan that takes more has failed.
     #[arg(long, value_name = "N", default_value_t = BaselineSettings::RRT_SAMPLES)]

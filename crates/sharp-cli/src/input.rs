@@ -7,7 +7,7 @@ use sharp_drive::SpeedLimits;
 use sharp_maps::{LoadOptions, MapFile, load, load_scenario, load_values};
 use sharp_plan::{Method, Query};
 use sharp_sim::{SimulatorKind, UnknownSimulator};
-use sharp_space::{Point, Pose, trig};
+use sharp_space::{Occupancy, Point, Pose, trig};
 
 use crate::args::{MapArgs, ProblemArgs, ReadingArgs, SpeedArgs, Unknown};
 use crate::outcome::Failure;
@@ -22,6 +22,10 @@ pub(crate) fn map(MapArgs { map, reading }: &MapArgs) -> Result<MapFile, Failure
 
 /// Reads the map called `name` as `args` want it.
 pub(crate) fn map_called(name: &str, args: &ReadingArgs) -> Result<MapFile, Failure> {
+    if let Some(resolution_m) = args.resolution.filter(|side_m| !(1e-6..=1000.0).contains(side_m)) {
+        let message = format!("--resolution is {resolution_m:?}, expected metres a cell, from 1e-6 to 1000");
+        return Err(Failure::new("USAGE", message));
+    }
     let options = LoadOptions {
         resolution_m: args.resolution,
         unknown_free: args.unknown == Unknown::Free,
@@ -57,10 +61,11 @@ pub(crate) fn map_called(name: &str, args: &ReadingArgs) -> Result<MapFile, Fail
     Ok(map)
 }
 
-/// The speed limits that `args` ask for, for a robot with a top speed of `max_speed_mps`.
+/// The speed limits in `map` that `args` ask for, for a robot with a top speed of `max_speed_mps`.
 pub(crate) fn speed_limits(
     args: &SpeedArgs,
     reading: &ReadingArgs,
+    map: &MapFile,
     max_speed_mps: f64,
 ) -> Result<Option<SpeedLimits>, Failure> {
     let Some(path) = &args.speed_mask else { return Ok(None) };
@@ -71,9 +76,14 @@ pub(crate) fn speed_limits(
     }
     let (base, multiplier) = (args.speed_base, args.speed_multiplier);
     let rule = SpeedRule { base, multiplier, is_absolute: args.speed_absolute };
-    let limits = sharp_bench::speed_limits(&mask, rule, max_speed_mps);
     let refused = |error| Failure::new("MAP_FIELD", format!("--speed-mask {}: {error}", path.display()));
-    limits.map(Some).map_err(refused)
+    let limits = sharp_bench::speed_limits(&mask, rule, max_speed_mps).map_err(refused)?;
+    let (frame, cells) = (map.grid.frame(), map.grid.cells().iter().enumerate());
+    let mut free = cells.filter(|(_, cell)| **cell == Occupancy::Free).map(|(index, _)| frame.cell(index));
+    if !free.any(|cell| limits.at(frame.center(cell)).is_finite()) {
+        eprintln!("warning: --speed-mask {}: limits no free cell of the map", path.display());
+    }
+    Ok(Some(limits))
 }
 
 /// The simulator called `name`.
@@ -154,6 +164,24 @@ fn cache_folder() -> PathBuf {
 
 /// Refuses a `folder` of `flag` that could not be made or written, before the work for it is done; leaves nothing behind.
 pub(crate) fn check_out(flag: &str, folder: &Path) -> Result<(), Failure> {
+    check_parent(flag, folder, folder)
+}
+
+/// The same for a `file`; what is there already and no plain file, as a pipe, is written into.
+pub(crate) fn check_out_file(flag: &str, file: &Path) -> Result<(), Failure> {
+    let real = std::fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
+    if real.is_dir() {
+        let message = format!("{flag} is {}, which is a folder, expected a file", file.display());
+        return Err(Failure::new("FILE_INVALID", message));
+    }
+    if real.exists() && !real.is_file() {
+        return Ok(());
+    }
+    check_parent(flag, file, real.parent().unwrap_or(Path::new("")))
+}
+
+/// Refuses `out` of `flag` if in `folder`, or where it would be made, no file can be made.
+fn check_parent(flag: &str, out: &Path, folder: &Path) -> Result<(), Failure> {
     let mut there = folder;
     while !there.exists() {
         match there.parent().filter(|parent| !parent.as_os_str().is_empty()) {
@@ -162,13 +190,27 @@ pub(crate) fn check_out(flag: &str, folder: &Path) -> Result<(), Failure> {
         }
     }
     tempfile::tempfile_in(there).map(drop).map_err(|error| {
-        let message = format!(
-            "{flag} is {}, but in {} no file can be made: {error}",
-            folder.display(),
-            there.display()
-        );
+        let message =
+            format!("{flag} is {}, but in {} no file can be made: {error}", out.display(), there.display());
         Failure::new("FILE_INVALID", message)
     })
+}
+
+/// Refuses an `out` of `--out` that is one of `inputs`: what the user gave would be lost.
+pub(crate) fn check_not_input<'a>(
+    out: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    let Ok(real) = std::fs::canonicalize(out) else { return Ok(()) };
+    let is_out = |input: &&Path| std::fs::canonicalize(input).is_ok_and(|input| input == real);
+    match inputs.into_iter().find(is_out) {
+        Some(input) => {
+            let message =
+                format!("--out would overwrite {}, which is read: choose another name", input.display());
+            Err(Failure::new("USAGE", message))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The query that the flags ask for.
@@ -310,8 +352,24 @@ mod tests {
         fs::write(&file, "").expect("a file");
         let message = check_out("--out", &file.join("plan")).unwrap_err().to_string();
         assert!(message.contains("--out") && message.contains("file/plan"), "{message}");
+        let message = check_out_file("--record", &file.join("a.mcap")).unwrap_err().to_string();
+        assert!(message.contains("--record") && message.contains("file/a.mcap"), "{message}");
+        assert!(check_out_file("--record", folder.path()).is_err(), "a folder is no file");
         let new = folder.path().join("some/where");
         check_out("--out", &new).expect("can be made");
+        check_out_file("--record", &new.join("a.mcap")).expect("can be made");
+        check_out_file("--record", &file).expect("can be replaced");
         assert!(!folder.path().join("some").exists(), "asking makes nothing");
+    }
+
+    #[test]
+    fn an_input_is_no_output_however_it_is_written() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [input, other] = ["input", "other"].map(|name| folder.path().join(name));
+        fs::write(&input, "").expect("a file");
+        let same = folder.path().join("./input");
+        let message = check_not_input(&same, [&*other, &*input]).unwrap_err().to_string();
+        assert!(message.contains("--out would overwrite") && message.contains("input"), "{message}");
+        check_not_input(&other, [&*other, &*input]).expect("there is no such file yet");
     }
 }

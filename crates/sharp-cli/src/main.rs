@@ -20,7 +20,7 @@ use crate::args::{Cli, PriorCommand, Regions, Subcommands};
 use crate::outcome::{Exit, Failure, say};
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|error| refuse(&error));
     if stops_gently(&cli.command) {
         progress::listen_for_interrupts();
     }
@@ -32,6 +32,16 @@ fn main() -> ExitCode {
         Exit::Broken
     });
     ExitCode::from(exit as u8)
+}
+
+/// Ends the program with what `error` says of the call, as JSON too where that is asked for. Help and versions come this way
+/// as well, and are no errors.
+fn refuse(error: &clap::Error) -> ! {
+    let wants_json = std::env::args_os().take_while(|arg| arg != "--").any(|arg| arg == "--json");
+    if wants_json && error.use_stderr() {
+        say!("{}", Failure::from(error).to_json());
+    }
+    error.exit()
 }
 
 /// Whether an interrupt is a wish to stop that the command asks for; all others end at once.
@@ -50,10 +60,8 @@ const fn stops_gently(command: &Subcommands) -> bool {
 
 fn dispatch(cli: &Cli) -> Result<Exit, Failure> {
     if let Some(threads) = cli.threads {
-        if threads == 0 {
-            return Err(Failure::new("USAGE", "--threads is 0, expected at least 1"));
-        }
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(anyhow::Error::from)?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
+        pool.build_global().map_err(anyhow::Error::from)?;
     }
     match &cli.command {
         Subcommands::Solve(args) => commands::solve::run(args, cli.seed, cli.json),

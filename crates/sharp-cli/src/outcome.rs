@@ -76,6 +76,20 @@ impl fmt::Display for Failure {
     }
 }
 
+impl From<&clap::Error> for Failure {
+    /// What is wrong with the call, in one line and without the usage that a terminal shows below it.
+    fn from(error: &clap::Error) -> Self {
+        if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+            return Self::new("USAGE", "a command is missing, --help lists all");
+        }
+        let text = error.render().to_string();
+        let ends = ["\n\nUsage:", "\n\nFor more information"].map(|end| text.find(end).unwrap_or(text.len()));
+        let said = &text[..ends[0].min(ends[1])];
+        let words: Vec<&str> = said.strip_prefix("error: ").unwrap_or(said).split_whitespace().collect();
+        Self::new("USAGE", words.join(" "))
+    }
+}
+
 impl From<MapError> for Failure {
     fn from(error: MapError) -> Self {
         Self::new(error.code(), error)

@@ -70,8 +70,15 @@ ask({"cancel": True}, "cancelLine", "cancelledLine")
 assert idle["status"] == "no_plan", idle
 for broken in ["{}", "go", '{"goal": [1]}', '{"goal": [1, 2], "pose": [1, 2, 3]}', '{"route": []}', '{"cancel": false}']:
     ask(broken, None, "errorLine")
+long = {"route": [[4.0, 5.0]] * 1001}
+ask(long, None, "errorLine")
 for kind, broken in [("goalLine", {"goal": [1]}), ("routeLine", {"route": []}), ("cancelLine", {"cancel": False})]:
     assert refused(kind, broken), broken
+assert refused("routeLine", long), "a route is too long"
+# A plan that was run, which an answer is where the composed odds are poor.
+odds = plan["plan"]["predicted"]
+is_sound("planLine", {"plan": {**plan["plan"], "predicted": {**odds, "basis": "runs"}}})
+assert refused("planLine", {"plan": {**plan["plan"], "predicted": {**odds, "basis": "guessed"}}}), "a basis is known"
 assert refused("planLine", {"plan": {**plan["plan"], "predicted": None}}), "a plan has odds"
 server.stdin.close()
 assert server.wait() == 0

@@ -133,6 +133,63 @@ fn broken_input_gives_exit_2_and_names_what_is_wrong() {
 }
 
 #[test]
+fn a_wrong_call_is_told_as_json_too() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, named) in [
+        (&["--json", "solve"][..], "<MAP>"),
+        (&["solve", "a", "--colour", "red", "--json"], "--colour"),
+        (&["--json", "map"], "command"),
+        (&["--json", "--threads", "0", "map", "info", "a"], "1..=4096"),
+    ] {
+        let output = sharp(folder.path(), args);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {output:?}");
+        let error = &json(&output)["error"];
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(error["code"] == "USAGE" && message.contains(named), "{args:?}: {error}");
+        assert!(!message.contains('\n') && !message.contains("Usage"), "one line: {message}");
+        assert!(!output.stderr.is_empty(), "{args:?}: a terminal has it as before");
+    }
+    let help = sharp(folder.path(), &["--json", "--help"]);
+    assert!(help.status.success() && String::from_utf8_lossy(&help.stdout).contains("Usage:"), "{help:?}");
+}
+
+#[test]
+fn a_negative_number_is_named_with_its_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    for (flag, value, says) in [
+        ("--failure-cost", "-1", "--failure-cost is -1, expected"),
+        ("--time-limit", "-1", "--time-limit is -1, expected"),
+        ("--min-success", "-0.5", "--min-success is -0.5, expected"),
+        ("--resolution", "-1", "--resolution is -1.0, expected"),
+        ("--verify", "-1", "--verify is \"-1\", expected"),
+        ("--seed", "-1", "'-1' for '--seed"),
+        ("--start-pixel", "-1,20", "--start-pixel is \"-1,20\", expected"),
+    ] {
+        let start = if flag == "--start-pixel" { &[][..] } else { &["--start", "2,3,0"] };
+        let args = ["solve", "rooms.yaml", flag, value, "--goal", "10,3", "--out", "plan"];
+        let output = sharp(folder.path(), &[&args[..], start].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{flag}: {said}");
+        assert!(said.contains(says), "{flag}: {said}");
+    }
+}
+
+// It said that 4 of 4 executions had arrived, where 200 were asked for.
+#[test]
+fn a_baseline_out_of_time_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let args = ["--json", "baseline", "track", "rooms.yaml", "--time-limit", "0"];
+    let output = sharp(folder.path(), &[&args[..], &ACROSS[..4]].concat());
+    let report = json(&output);
+    assert_eq!(output.status.code(), Some(1), "{report}");
+    assert_eq!((&report["status"], &report["episodes"]), (&"timeout".into(), &0.into()), "{report}");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("time was up after 0 of 20 executions"), "{said}");
+}
+
+#[test]
 fn a_goal_behind_a_wall_is_a_no_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     write_rooms(folder.path(), false);
@@ -199,6 +256,12 @@ fn a_page_to_look_at_is_written_where_it_is_wanted() {
     let (run, shown) = (json(&run), data("three.html"));
     assert_eq!((&shown["runs"]["episodes"], &shown["runs"]["reached"]), (&3.into(), &run["successes"]));
     assert_eq!(shown["map"]["name"], "rooms");
+    // The page and the runs of an earlier plan would be taken for those of the new one.
+    let drives =
+        ["run.json", "run.png", "run.svg", "show.html"].map(|file| folder.path().join("one").join(file));
+    assert!(drives.iter().all(|file| file.exists()), "of the first plan");
+    let again = solve_rooms(folder.path(), &["--library", "none", "--out", "one"]);
+    assert!(again.status.success() && drives.iter().all(|file| !file.exists()), "of no plan any more");
     for args in [&["run", "--show", "one"][..], &["run", "one", "--show", "page.txt"]] {
         let output = sharp(folder.path(), args);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -272,6 +335,26 @@ fn a_library_is_reused_and_a_damaged_one_is_named() {
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let message = json(&output)["error"]["message"].to_string();
     assert!(message.contains(option.file_name().unwrap().to_str().unwrap()), "{message}");
+}
+
+// A folder of plans was a library without options, and a wrong folder an empty list.
+#[test]
+fn what_is_no_library_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rooms(folder.path(), true);
+    let solved =
+        solve_rooms(folder.path(), &["--library", "lib", "--options", "centroid", "--out", "plans/one"]);
+    assert!(solved.status.success(), "{solved:?}");
+    for (command, place) in [("check", "plans"), ("list", "plans"), ("list", "plans/one"), ("check", ".")] {
+        let output = sharp(folder.path(), &["--json", "library", command, place]);
+        assert_eq!(output.status.code(), Some(2), "{command} {place}: {output:?}");
+        let message = json(&output)["error"]["message"].to_string();
+        assert!(message.contains("is no library: no folder in it holds options"), "{place}: {message}");
+    }
+    let list = sharp(folder.path(), &["library", "list", "lib"]);
+    assert!(list.status.success(), "{list:?}");
+    let listed = String::from_utf8_lossy(&list.stdout).into_owned();
+    assert!(listed.lines().all(|line| line.contains(", cost ")), "{listed}");
 }
 
 /// What lies in `folder` and below, by path, but for wall times.
@@ -500,7 +583,7 @@ fn regions_are_scored_at_the_doors_of_a_map() {
     };
     for regions in ["net", "geometric"] {
         let report = json(&score("doors.yaml", regions));
-        assert_eq!(report["schema"], "sharp.regions.score/1", "{report}");
+        assert_eq!(report["schema"], "sharp.regions.doors/1", "{report}");
         assert_eq!((&report["doors"], &report["found"]), (&1.into(), &1.into()), "{regions}: {report}");
         assert_eq!(report["door_recall"], 1.0, "{regions}: {report}");
     }

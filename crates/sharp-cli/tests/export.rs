@@ -13,10 +13,10 @@ use std::sync::LazyLock;
 use rand::RngExt;
 use serde_json::{Value, json};
 use sharp_drive::World;
-use sharp_export::{RouteGraph, is_line_free, networks};
+use sharp_export::{PlannedPath, RouteGraph, is_line_free, networks, planned_mcap};
 use sharp_maps::{LoadOptions, load};
 use sharp_options::OptionKind;
-use sharp_plan::{Method, Plan};
+use sharp_plan::{ComposedOdds, Method, Plan, PlanPiece};
 use sharp_rl::ActorScratch;
 use sharp_sim::{NoiseModel, RobotModel};
 use sharp_space::{Cell, OccupancyGrid, Point, Seed};
@@ -115,6 +115,27 @@ fn recordings_decode_topic_by_topic() {
     }
     let mean_s = report["mean_sim_time_s"].as_f64().expect("a number");
     assert!(mean_s > 0.0, "the report of a recorded run is that of any run: {report}");
+}
+
+/// The whole runs that composed odds are worth, and the success of legs, stood in for the odds themselves.
+#[test]
+fn composed_odds_are_exported_as_they_are() {
+    let (folder, mut plan) = (&PLAN.0, plan());
+    let legs = plan.solution.steps.len() as f64;
+    let piece = |until, success| PlanPiece { until, success, episodes: 50.0, time_s: 5.0, runs: 0 };
+    let odds = ComposedOdds::of(vec![piece(legs - 1.0, 0.91), piece(legs, 0.83)]);
+    plan.solution.predicted = odds.count();
+    plan.solution.composed = Some(odds.clone());
+    let told: Value = serde_json::from_str(&PlannedPath::new(&plan).to_json(&plan)).expect("JSON");
+    for (key, expected) in [("success", odds.success), ("lower95", odds.lower95)] {
+        let told = told["predicted"][key].as_f64().expect("a number");
+        assert!((told - expected).abs() < 1e-9, "{key}: {told}, not {expected}");
+    }
+    let file = folder.join("composed.mcap");
+    fs::write(&file, planned_mcap(&plan).expect("a recording")).expect("a file");
+    if let Some(said) = example("read_mcap.py", &[&file]) {
+        assert!(said.contains("odds 0.830"), "of the last leg: {said}");
+    }
 }
 
 #[test]

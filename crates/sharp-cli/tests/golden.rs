@@ -147,7 +147,7 @@ fn stages(folder: &Path, threads: &str) -> BTreeMap<String, String> {
     let place = folder.join(format!("stages-{threads}"));
     fs::create_dir(&place).expect("a folder");
     for command in [
-        "map save a --out map",
+        "map save a --out map.yaml",
         "regions predict a --robot limo --out regions",
         "abstract a --robot limo --out abstract",
         "solve a --problem 5 --robot limo --library library --out plan",

@@ -61,6 +61,37 @@ fn a_saved_map_is_the_same_map_and_an_image_finds_its_description() {
     assert!(said(&output).contains("hall.yaml beside it"), "{}", said(&output));
 }
 
+// A coarse copy took the place of the user's map, and without an ending it was one that nothing read.
+#[test]
+fn a_map_is_not_saved_over_what_is_read_nor_without_an_ending() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    write_hall(folder.path(), "hall", 0..0);
+    write_hall(folder.path(), "mask", 55..60);
+    fs::create_dir(path("images")).expect("a folder");
+    fs::rename(path("hall.pgm"), path("images/floor.pgm")).expect("moved");
+    let yaml = fs::read_to_string(path("hall.yaml")).expect("just written");
+    fs::write(path("hall.yaml"), yaml.replace("hall.pgm", "images/floor.pgm")).expect("a file");
+    fs::write(path("images/floor.yaml"), "mine").expect("a file");
+    let files = ["hall.yaml", "images/floor.pgm", "mask.yaml", "mask.pgm"];
+    let before = files.map(|name| fs::read(path(name)).expect("a file"));
+    for (out, says) in [
+        ("hall.yaml", "would overwrite hall.yaml"),
+        ("./images/../hall.yaml", "would overwrite hall.yaml"),
+        ("images/floor.yaml", "would overwrite images/floor.pgm"),
+        ("mask.yaml", "would overwrite mask.yaml"),
+        ("copy", "ends in .yaml"),
+    ] {
+        let args = ["map", "save", "hall.yaml", "--keepout", "mask.yaml", "--downsample", "10", "--out", out];
+        let refused = sharp(folder.path(), &args);
+        assert_eq!(refused.status.code(), Some(2), "{out}: {}", said(&refused));
+        assert!(said(&refused).contains(says), "{out}: {}", said(&refused));
+    }
+    assert_eq!(files.map(|name| fs::read(path(name)).expect("a file")), before, "nothing is lost");
+    let saved = sharp(folder.path(), &["map", "save", "hall.yaml", "--out", "new/folder/copy.yaml"]);
+    assert!(saved.status.success() && path("new/folder/copy.pgm").exists(), "{}", said(&saved));
+}
+
 #[test]
 fn a_misspelt_key_of_a_map_is_told() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -183,6 +214,9 @@ fn goals_in_a_row_are_solved_run_and_served_as_one() {
     // A single goal in the same folder takes the place of the tour.
     let single = ["solve", "hall.yaml", "--start", "1,4,0", "--goal", "9,4", "--out", "p", "--json"];
     assert!(sharp(folder.path(), &[&single[..], &QUICK].concat()).status.success(), "solved");
+    let left =
+        ["goal-1", "goal-2", "run.json", "tour.ron"].map(|name| folder.path().join("p").join(name).exists());
+    assert_eq!(left, [false; 4], "nothing of the tour is left");
     let run = json(&sharp(folder.path(), &["run", "p", "--episodes", "5", "--json"]));
     assert!(run["mean_path_m"].as_f64().is_some_and(|m| m < 12.0), "one goal: {run}");
     let wanted = [&args[..9], &["q", "--min-success", "1", "--noise", "harsh", "--json"], &QUICK].concat();
@@ -219,6 +253,17 @@ fn a_speed_mask_holds_in_the_prediction_and_in_the_drives() {
     assert_eq!(run["successes"], 3, "{run}");
     let driven_s = run["mean_sim_time_s"].as_f64().expect("a time");
     assert!((driven_s - time_s(&slow)).abs() < 2.0, "the plan keeps the mask: {run}");
+    // A mask elsewhere, and one of a mode that has no numbers, are told: they limit nothing.
+    let yaml = fs::read_to_string(folder.path().join("slow.yaml")).expect("just written");
+    let elsewhere = yaml.replace("[-1.0, 2.0, 0.0]", "[100.0, 2.0, 0.0]");
+    fs::write(folder.path().join("elsewhere.yaml"), elsewhere).expect("a file");
+    let trinary = yaml.replace("raw", "trinary").replace("0.65", "1.0");
+    fs::write(folder.path().join("trinary.yaml"), trinary).expect("a file");
+    for (mask, says) in [("elsewhere.yaml", "limits no free cell"), ("trinary.yaml", "is of mode trinary")] {
+        let output =
+            sharp(folder.path(), &[&args[..], &QUICK, &["--out", "x", "--speed-mask", mask]].concat());
+        assert!(output.status.success() && said(&output).contains(says), "{mask}: {}", said(&output));
+    }
     let half = ["--out", "half", "--speed-mask", "slow.yaml", "--speed-absolute"];
     let half = solve(&[&half[..], &["--speed-base", "0", "--speed-multiplier", "0.0066667"]].concat());
     assert!((14.0..19.0).contains(&time_s(&half)), "half a metre per second: {half}");

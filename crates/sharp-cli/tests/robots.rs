@@ -54,6 +54,27 @@ fn a_robot_is_imported_shown_and_used() {
     assert_eq!((&check["robot"], &check["passable"]), (&"b".into(), &true.into()), "{check}");
 }
 
+// The parameters were replaced by the robot, and were blamed for flags that no robot could have.
+#[test]
+fn an_import_spares_its_input_and_names_the_flag_that_is_wrong() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("nav2.yaml"), PARAMETERS).expect("a file");
+    for (flag, value, says) in [
+        ("--out", "./nav2.yaml", "--out would overwrite nav2.yaml"),
+        ("--max-speed", "nan", "--max-speed is NaN, must be above 0"),
+        ("--max-speed", "0", "--max-speed is 0.0, must be above 0"),
+        ("--max-speed", "-1", "--max-speed is -1.0, must be above 0"),
+        ("--name", "a/b", "--name: robot name is \"a/b\""),
+    ] {
+        let refused = sharp(folder.path(), &["robot", "import", "nav2.yaml", flag, value]);
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{flag} {value}: {said}");
+        assert!(said.contains(says), "{flag} {value}: {said}");
+    }
+    let kept = fs::read_to_string(folder.path().join("nav2.yaml")).expect("still there");
+    assert_eq!(kept, PARAMETERS, "the input is as it was");
+}
+
 #[test]
 fn built_in_robots_are_listed_and_known_in_any_case() {
     let folder = tempfile::tempdir().expect("a folder");

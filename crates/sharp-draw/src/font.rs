@@ -40,15 +40,9 @@ impl Weight {
     }
 }
 
-/// Width of `text` in the regular weight at `size`, in the unit of `size`.
+/// Width of `text` in `weight` at `size`, in the unit of `size`.
 ///
 /// A letter that the font lacks counts as its box for unknown letters.
-#[must_use]
-pub fn text_width(text: &str, size: f64) -> f64 {
-    width(text, size, Weight::Regular)
-}
-
-/// Width of `text` in `weight` at `size`.
 pub(crate) fn width(text: &str, size: f64, weight: Weight) -> f64 {
     let font = FontRef::new(weight.file()).expect("the embedded font is sound");
     let (letters, at) = (font.charmap(), (Size::unscaled(), LocationRef::default()));
@@ -78,11 +72,12 @@ mod tests {
 
     #[test]
     fn widths_add_up_and_grow_with_weight() {
-        let parts = text_width("SHARP ", 11.0) + text_width("interface", 11.0);
-        assert!((text_width("SHARP interface", 11.0) - parts).abs() < 1e-9, "no kerning");
-        assert!((text_width("x", 20.0) - 2.0 * text_width("x", 10.0)).abs() < 1e-9, "in proportion");
-        assert!(width("title", 13.0, Weight::SemiBold) > width("title", 13.0, Weight::Regular));
-        assert_eq!(text_width("", 11.0), 0.0);
+        let regular = |text: &str, size: f64| width(text, size, Weight::Regular);
+        let parts = regular("SHARP ", 11.0) + regular("interface", 11.0);
+        assert!((regular("SHARP interface", 11.0) - parts).abs() < 1e-9, "no kerning");
+        assert!((regular("x", 20.0) - 2.0 * regular("x", 10.0)).abs() < 1e-9, "in proportion");
+        assert!(width("title", 13.0, Weight::SemiBold) > regular("title", 13.0));
+        assert_eq!(regular("", 11.0), 0.0);
     }
 
     #[test]

@@ -39,7 +39,6 @@ pub mod numbers;
 pub use axis::Axis;
 pub use chart::{Chart, Marker};
 pub use color::Color;
-pub use font::text_width;
 pub use overlay::{cells_per_pixel, known_cells, regions_outline, states_png, walls_png};
 pub use panel::{LegendItem, Panel, legend, sheet};
 pub use png::{PngError, svg_to_png};

@@ -126,11 +126,13 @@ impl Automaton {
         Situation { world, observation, progress, guide: self.link().guide() }
     }
 
-    /// Returns true if the option that runs is done.
+    /// Returns true if the option that runs is done, or has passed its termination set on the way into the next one.
     #[must_use]
     pub fn is_done(&self) -> bool {
-        let Link { option, until_m, .. } = self.link();
-        option.is_done(&self.observation.state.pose) || self.progress.arc_m >= *until_m
+        let Link { option, next, until_m } = self.link();
+        let pose = &self.observation.state.pose;
+        let is_passed = |next: &Arc<GuidedOption>| option.is_passed(pose, self.progress.remaining_m, next);
+        option.is_done(pose) || self.progress.arc_m >= *until_m || next.as_ref().is_some_and(is_passed)
     }
 
     /// Goes on to the next option while the one that runs is done; returns false if the last one is.

@@ -177,7 +177,7 @@ pub struct EpisodeRecord {
 pub struct Supervisor<'a> {
     /// Wall time, microseconds.
     pub clock_us: &'a (dyn Fn() -> f64 + Sync),
-    /// Whether to give up; an episode that runs then counts as timed out.
+    /// Whether to give up; an episode that runs then ends as [`EpisodeEnd::Stopped`], which says nothing of the controller.
     pub should_stop: &'a (dyn Fn() -> bool + Sync),
 }
 

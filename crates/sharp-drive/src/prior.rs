@@ -1,7 +1,7 @@
 //! The prior: one policy per kind of robot, learnt once on many generated maps, guides and noises.
 //!
-//! An option then begins with a policy that already drives: it is evaluated as it is, at several degrees of
-//! caution, and trained further only where that falls short (`docs/algorithms/prior.md`). The network corrects a
+//! An option then begins with a policy that already drives: it is evaluated as it is, with the caution that the cost of a
+//! failure asks for ([`Prior::caution`]), and trained further only where that falls short (`docs/algorithms/prior.md`). The network corrects a
 //! follower in the guide's own frame ([`PolicyInterface::Guide`]), so that what it learnt does not depend on the map.
 //! It is told which noise to expect and how much a contact matters ([`PolicyContext`]).
 

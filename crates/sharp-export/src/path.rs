@@ -97,6 +97,7 @@ impl PlannedPath {
     #[must_use]
     pub fn to_json(&self, plan: &Plan) -> String {
         let solution = &plan.solution;
+        let composed = solution.composed.as_ref();
         let value = json!({
             "schema": "sharp.path/1",
             "header": header(0.0),
@@ -104,8 +105,8 @@ impl PlannedPath {
             "robot": plan.world.robot.name,
             "goal_tolerance_m": plan.world.robot.goal_tolerance_m,
             "predicted": {
-                "success": solution.predicted.rate(),
-                "lower95": solution.predicted.lower95(),
+                "success": solution.success(),
+                "lower95": composed.map_or_else(|| solution.predicted.lower95(), |odds| odds.lower95),
                 "sim_time_s": solution.predicted_time_s,
             },
             "legs": solution.steps.iter().map(leg).collect::<Vec<_>>(),

@@ -182,13 +182,9 @@ impl File {
     }
 }
 
-/// The chance to reach the goal from the beginning of each leg of `plan`: the product over this leg and those after it
-/// of their success on arrival.
+/// The chance to reach the goal from the beginning of each leg of `plan`.
 fn odds(plan: &Plan) -> BTreeMap<LegId, f64> {
-    let mut chance = 1.0;
-    let back = plan.solution.steps.iter().rev().map(|step| {
-        chance *= step.on_arrival.rate();
-        (step.option.id, chance)
-    });
-    back.collect()
+    let odds = plan.solution.odds();
+    let legs = plan.solution.steps.iter().enumerate();
+    legs.map(|(leg, step)| (step.option.id, odds.rest((leg, 0.0)).0)).collect()
 }

@@ -24,7 +24,8 @@ pub fn arriving(robot: &GuideRobot<'_>, guide: &GuidePath, heading: Heading) -> 
         let curve = Steering::Dubins { radius_m: RADIUS_FACTOR * robot.steering.radius_m() };
         let length_m = guide.length_m();
         let steps = (BACK_MAX_M.min(length_m) / BACK_STEP_M).floor() as usize;
-        let ends = (0..=steps).map(|i| length_m - i as f64 * BACK_STEP_M).chain([0.0]);
+        let start = (length_m <= BACK_MAX_M).then_some(0.0);
+        let ends = (0..=steps).map(|i| length_m - i as f64 * BACK_STEP_M).chain(start);
         let curves = ends.map(|arc_m| (arc_m, curve.maneuver(guide.pose_at(arc_m), goal)));
         let free = curves.filter(|(_, curve)| curve.all(CHECK_STEP_M, |pose| robot.geometry.is_free(pose)));
         let total_m = |(arc_m, curve): &(f64, sharp_motion::Maneuver)| arc_m + curve.travel_m();

@@ -212,7 +212,7 @@ impl<'a> GuideContext<'a> {
         let joins = (2..=(4.0 * LEAD_IN_MAX_M) as usize).map(|i| i as f64 * 0.25);
         let (_, arc_m, maneuver) = joins
             .take_while(|&arc_m| arc_m < length_m)
-            .chain([length_m])
+            .chain((length_m <= LEAD_IN_MAX_M).then_some(length_m))
             .map(|arc_m| (arc_m, curve.maneuver(start, guide.pose_at(arc_m))))
             .filter(|(_, maneuver)| maneuver.all(CHECK_STEP_M, |pose| self.is_free(pose)))
             .map(|(arc_m, maneuver)| (maneuver.travel_m() + length_m - arc_m, arc_m, maneuver))

@@ -36,7 +36,8 @@ pub enum LegId {
     First(u32),
     /// An option.
     Option(OptionId),
-    /// From the endpoint with this index, entered from the given state, to the goal configuration.
+    /// From the endpoint with this index, where the robot is in the given state or about to enter it, to the goal
+    /// configuration.
     Last(u32, StateId),
     /// From the initial to the goal configuration without any option.
     Direct,
@@ -167,6 +168,9 @@ pub struct GuidedOption {
     pub departure: Departure,
     /// Its termination set β.
     pub target: Target,
+    /// Whether it ends as well where the robot passes its termination set ([`GuidedOption::is_passed`]). So do the options
+    /// of a joined plan, whose guides lead on into one another.
+    pub ends_in_passing: bool,
     /// The states it may use without straying.
     pub allowed: Vec<StateId>,
     /// Its initiation set I, where it may be as well; `None` for one from a configuration.
@@ -177,6 +181,10 @@ pub struct GuidedOption {
 
 /// Cells this far from a guide can matter to its policy, metres: the reach of its rays and its outline.
 const CORRIDOR_M: f64 = 3.0;
+/// So little of the guide is none, metres: sums of lengths are rounded.
+const AT_END_M: f64 = 1e-9;
+/// A termination set is passed by at most so many times its radius.
+const PASSING_FACTOR: f64 = 3.0;
 /// Actions that every option may take, however short.
 const HORIZON_MIN_ACTIONS: u32 = 10;
 /// An option may take so many times the actions that the slowest policy needs.
@@ -203,6 +211,7 @@ impl GuidedOption {
             guide,
             departure: Departure::default(),
             target: target.map_or(Target::Goal(goal), |id| Target::Endpoint(endpoint(id))),
+            ends_in_passing: false,
             allowed: space.allowed_states(id, from, to),
             source: source.map(endpoint),
             states: Arc::clone(&space.states),
@@ -222,6 +231,17 @@ impl GuidedOption {
             Target::Endpoint(endpoint) => endpoint.contains(pose.position, &*self.states),
             Target::Goal(goal) => goal.is_reached(pose),
         }
+    }
+
+    /// Returns true if a robot at `pose`, with `remaining_m` of the guide left, has passed the termination set beside it,
+    /// where the option `next` may begin as well: the guide is behind it, and it is in a state that `next` may use.
+    #[must_use]
+    pub fn is_passed(&self, pose: &Pose, remaining_m: f64, next: &Self) -> bool {
+        let is_near = || {
+            let Target::Endpoint(endpoint) = &self.target else { return false };
+            (pose.position - endpoint.center).norm() < PASSING_FACTOR * endpoint.radius_m
+        };
+        self.ends_in_passing && remaining_m < AT_END_M && is_near() && next.is_allowed(pose)
     }
 
     /// Returns true if a robot at `pose` is where the option may be: the complement of the second case of

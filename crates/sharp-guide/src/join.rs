@@ -5,6 +5,9 @@
 //! they come nearest to those centres. Where the joined path fails at a place, the options around it alone are smoothed
 //! again with other weights, first with the same margin and then with smaller ones. Where that fails too, the options
 //! there keep their own guides, and those before and behind are joined. The library keeps the guides as they were planned.
+//!
+//! A robot that follows a joined path under noise may pass beside a set that it was to enter, and has no reason to come
+//! back. So the options of the plan end there as well.
 
 use std::cell::Cell as Memory;
 use std::collections::BTreeSet;
@@ -60,7 +63,17 @@ pub fn join_guides(
         Some(guide) => Arc::new(GuidedOption { guide, ..GuidedOption::clone(&option) }),
         None => option,
     };
-    options.into_iter().zip(guides).map(with).collect()
+    let mut joined: Vec<_> = options.into_iter().zip(guides).map(with).collect();
+    end_in_passing(&mut joined);
+    joined
+}
+
+/// Lets all of `options`, which follow one another, but the last end as well where the robot passes their sets.
+pub fn end_in_passing(options: &mut [Arc<GuidedOption>]) {
+    let Some((_, before)) = options.split_last_mut() else { return };
+    for option in before {
+        Arc::make_mut(option).ends_in_passing = true;
+    }
 }
 
 /// Where a run of options begins and ends.

@@ -52,7 +52,7 @@ pub use gap::gap_m;
 pub use goal::Goal;
 pub use guided_option::{GuidedOption, LegId, OptionSpace, Role, Target};
 pub use inflate::{GuideRobot, InflatedRobot, inflated_robots};
-pub use join::join_guides;
+pub use join::{end_in_passing, join_guides};
 pub use path::{GuidePath, GuidePathError, Projection};
 pub use planner::{ClearanceSearch, GuidePlanner, LearnAndLink};
 pub use request::{GuideEnd, GuideRequest, NoGuide, UnguidedOption};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use sharp_guide::{Departure, GuideSettings, GuidedOption, join_guides};
 use sharp_options::OptionKind;
-use sharp_space::{Point, Pose};
+use sharp_space::{Point, Pose, Vector};
 use worlds::{Drawn, HALL, Problem, RING, along};
 
 /// Two halls with a door of two cells between them, and four regions in a row.
@@ -75,7 +75,7 @@ fn where_a_path_cannot_meet_a_set_the_guides_are_left_alone() {
     // There and back again: no path along the hall meets the same sets in the wrong order.
     let back = [0, 2, 1, 3].map(|index| Arc::clone(&alone[index])).to_vec();
     let joined_back = joined(&drawn, &back, along().start);
-    let kept = back.iter().zip(&joined_back).filter(|(before, after)| Arc::ptr_eq(before, after)).count();
+    let kept = back.iter().zip(&joined_back).filter(|(before, after)| before.guide == after.guide).count();
     assert!(kept > 0, "all of it was joined");
     for (before, after) in back.iter().zip(&joined_back) {
         let ends = [(before.guide.end(), after.guide.end()), (before.guide.start(), after.guide.start())];
@@ -117,7 +117,28 @@ fn behind_a_beginning_that_is_driven_with_care_all_others_are_joined() {
     let careful = Departure { careful_m: 0.5, ..Departure::default() };
     alone[0] = Arc::new(GuidedOption::clone(&alone[0]).with_departure(careful));
     let joined = joined(&drawn, &alone, around().start);
-    assert!(Arc::ptr_eq(&joined[0], &alone[0]), "it stays as it was");
+    assert!(joined[0].guide == alone[0].guide, "it stays as it was");
     assert!(joined[1..].iter().zip(&alone[1..]).all(|(after, before)| after.guide != before.guide), "joined");
     assert!(joined[0].guide.end().distance_m(&joined[1].guide.start()) < 1e-9, "a gap");
+}
+
+#[test]
+fn an_option_of_a_joined_plan_ends_where_its_set_is_passed_close_by_and_the_next_may_drive() {
+    let drawn = Drawn::new(HALL, OptionKind::Interface);
+    let joined = joined(&drawn, &drawn.plan(&["first:0", "i:0-1-2", "last:1"], along()), along().start);
+    let ends: Vec<bool> = joined.iter().map(|option| option.ends_in_passing).collect();
+    assert_eq!(ends, [true, true, false], "the last one ends at the goal only");
+    let (first, next) = (&joined[0], &joined[1]);
+    let radius_m = first.target.endpoint().expect("a set").radius_m;
+    let beside = |factor: f64| {
+        Pose::at(first.guide.end().to_world(Vector::new(0.0, factor * radius_m)), first.guide.end().heading)
+    };
+    assert!(!first.is_done(&beside(1.5)), "beside the set");
+    assert!(first.is_passed(&beside(1.5), 0.0, next), "beside the set, the guide behind it");
+    assert!(!first.is_passed(&beside(1.5), 0.2, next), "some of the guide is left");
+    assert!(!first.is_passed(&beside(4.0), 0.0, next), "far from the set");
+    let strict = GuidedOption { ends_in_passing: false, ..GuidedOption::clone(first) };
+    assert!(!strict.is_passed(&beside(1.5), 0.0, next), "an option that ends in its set only");
+    let narrow = GuidedOption { allowed: vec![], source: None, ..GuidedOption::clone(next) };
+    assert!(!first.is_passed(&beside(1.5), 0.0, &narrow), "where the next one may not drive");
 }

@@ -27,7 +27,7 @@ mod formats;
 
 #[cfg(feature = "files")]
 pub use formats::{
-    Door, LoadOptions, MapError, MapFile, MovingAiProblem, Problem, ValueMask, load, load_doors,
+    Door, LoadOptions, MapError, MapFile, MovingAiProblem, Problem, ValueMask, image_of, load, load_doors,
     load_scenario, load_values, named_maps, save_ros,
 };
 pub use generate::{FloorplanKind, generate, turned_from};

@@ -148,9 +148,10 @@ fn algorithm_1(
     let mut most = if method.verify_episodes == 0 { COMPOSED_MAX } else { VERIFIED_MAX };
     let mut best: Option<Solution> = None;
     let (mut chosen, mut measured): (_, Vec<Vec<LegId>>) = (vec![], vec![]);
+    let mut other = None;
     for attempt in 1..=ATTEMPTS_MAX {
         // 9: p <- A*_search(O, s_i, s_g), and 15: G <- compute_option_guide(I_o, beta_o) for each option of p
-        let Some((_, p)) = cheapest(problem, &mut search, policies) else {
+        let Some((_, p)) = other.take().or_else(|| cheapest(problem, &mut search, policies)) else {
             if monitor.should_stop() && best.is_none() {
                 return Ok(Outcome::Stopped);
             }
@@ -171,19 +172,15 @@ fn algorithm_1(
             return Ok(Outcome::Stopped);
         }
         // 17: the cost of an option is now what was measured, so a weak one may have a better alternative.
-        let other_s = |search: &mut Search<'_>, policies: &Policies<'_>, measured: &[Vec<LegId>]| {
-            let other = cheapest(problem, search, policies);
-            let is_new = |legs: &Vec<LegId>| *legs != names(&p) && !measured.contains(legs);
-            other.filter(|(_, other)| is_new(&names(other))).map_or(f64::INFINITY, |(seconds, _)| seconds)
-        };
         let is_composed = method.verify_episodes == 0;
         let may_go_on = attempt < ATTEMPTS_MAX || best.is_some();
-        if !is_composed
-            && may_go_on
-            && has_weak_option(problem, &p, policies)
-            && other_s(&mut search, policies, &measured).is_finite()
-        {
-            continue;
+        if !is_composed && may_go_on && has_weak_option(problem, &p, policies) {
+            let tried: Vec<_> = measured.iter().cloned().chain([names(&p)]).collect();
+            other =
+                cheapest(problem, &mut search, policies).filter(|other| !tried.contains(&names(&other.1)));
+            if other.is_some() {
+                continue;
+            }
         }
         // Beyond the paper: Pi is repaired and measured, and the search looks again while another plan seems cheaper.
         monitor.phase(Phase::Verify);
@@ -205,10 +202,15 @@ fn algorithm_1(
             chosen.clone_from(&p);
         }
         let best_s = best.as_ref().map_or(f64::INFINITY, cost_s);
-        if is_stopped
-            || measured.len() == most
-            || best_s <= method.retry_above * other_s(&mut search, policies, &measured)
-        {
+        if is_stopped || measured.len() == most {
+            break;
+        }
+        let is_new = |other: &(f64, Vec<Arc<GuidedOption>>)| !measured.contains(&names(&other.1));
+        other = cheapest(problem, &mut search, policies).filter(is_new);
+        if other.is_none() && !is_composed {
+            other = search.direct(&|id| policies.estimate(id), problem.monitor).filter(is_new);
+        }
+        if other.as_ref().is_none_or(|(other_s, _)| best_s <= method.retry_above * other_s) {
             break;
         }
     }
@@ -249,7 +251,7 @@ fn cheapest(
     search: &mut Search<'_>,
     policies: &Policies<'_>,
 ) -> Option<(f64, Vec<Arc<GuidedOption>>)> {
-    search.plan(&|id| policies.get(id).map(|learnt| learnt.estimate), problem.monitor)
+    search.plan(&|id| policies.estimate(id), problem.monitor)
 }
 
 fn join(problem: &PlanningProblem<'_>, plan: Vec<Arc<GuidedOption>>) -> Vec<Arc<GuidedOption>> {

@@ -11,8 +11,9 @@ use sharp_drive::{
     Automaton, Command, Controller, Decision, Link, Motion, Observation, OptionPolicy, Policy, Prior,
     StandstillDetector,
 };
-use sharp_guide::{GuidedOption, LegId};
+use sharp_guide::{GuidedOption, LegId, end_in_passing};
 use sharp_sim::RobotState;
+use sharp_space::Point;
 
 use crate::plan_file::Plan;
 use crate::query::Query;
@@ -23,8 +24,10 @@ use crate::verify::PlannedOption;
 const STRAY_ACTIONS_MAX: u32 = 4;
 /// A robot nearer to its guide than this has not strayed, whatever state it is in, metres.
 const OFF_GUIDE_M: f64 = 0.6;
-/// New plans in a row before the policy gives up.
+/// New plans around one place before the policy gives up.
 const RECOVERIES_MAX: u32 = 10;
+/// A robot this far from where it last got a new plan has moved on, metres.
+const MOVED_ON_M: f64 = 3.0;
 
 /// Counts of what went otherwise than planned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -51,8 +54,10 @@ pub struct ComposedPolicy {
     has_collided: bool,
     /// The last decision came with a new plan.
     is_recovering: bool,
-    /// New plans since the robot began, or was set down somewhere else.
+    /// New plans around one place.
     tries: u32,
+    /// Where the last of them was made.
+    tried_at: Point,
     events: Events,
 }
 
@@ -75,6 +80,7 @@ impl ComposedPolicy {
             has_collided: false,
             is_recovering: false,
             tries: 0,
+            tried_at: state.pose.position,
             events: Events::default(),
         }
     }
@@ -165,10 +171,15 @@ impl ComposedPolicy {
 
     /// A new plan from here; false if there is none, or too many were made.
     fn recover(&mut self) -> bool {
+        let place = self.automaton.observation().state.pose.position;
+        if (place - self.tried_at).norm() > MOVED_ON_M {
+            self.tries = 0;
+        }
         if self.tries >= RECOVERIES_MAX {
             return false;
         }
         self.tries += 1;
+        self.tried_at = place;
         self.events.recoveries += 1;
         self.begin_anew()
     }
@@ -201,7 +212,10 @@ impl ComposedPolicy {
             search.offer_direct();
         }
         let measured = |id: LegId| known.get(&id).filter(|_| is_kept(&id)).map(|step| step.learnt.estimate);
-        let (_, options) = search.plan(&measured, &())?;
+        let (_, mut options) = search.plan(&measured, &())?;
+        if plan.method.join_guides {
+            end_in_passing(&mut options);
+        }
         let caution = Prior::caution(&plan.world.robot, plan.method.failure_cost_s);
         let prior = || plan.world.prior().at(caution, &plan.world.robot, &plan.noise);
         let policy = |option: &Arc<GuidedOption>| {
@@ -235,7 +249,8 @@ impl Controller for ComposedPolicy {
         self.is_recovering = true;
         // Out of contact first: a forward-only robot with its nose at a wall cannot turn.
         let departs = self.automaton.link().option.departure.back_off_m > 0.0;
-        if self.has_collided && !departs && self.plan.world.robot.recovery_reverse_m > 0.0 {
+        let has_collided = std::mem::take(&mut self.has_collided);
+        if has_collided && !departs && self.plan.world.robot.recovery_reverse_m > 0.0 {
             return Decision::BackOff { distance_m: self.plan.world.robot.recovery_reverse_m };
         }
         self.drive()

@@ -173,9 +173,11 @@ fn nan_line(body: &str) -> Option<usize> {
 pub(crate) fn write_blob(folder: &Path, bytes: &[u8], ending: &str) -> Result<String, FileError> {
     let name = format!("{}.{ending}", &hash(bytes)[..32]);
     let path = folder.join(&name);
-    if !path.exists() {
-        write_atomic(&path, bytes)?;
+    // A damaged file is written again.
+    if fs::read(&path).is_ok_and(|found| found == bytes) {
+        return Ok(name);
     }
+    write_atomic(&path, bytes)?;
     Ok(name)
 }
 

@@ -33,7 +33,7 @@ const STATE_POOL: usize = 64;
 /// How they spread: as robots arrive there. They have half an option left to get onto the guide.
 const ARRIVING: StateSpread = StateSpread { radius_m: 0.15, heading_sd_rad: 0.15, speed_max_mps: 1.0 };
 /// Raised whenever hand-overs are measured in another way.
-const RULE: u32 = 4;
+const RULE: u32 = 5;
 /// Way that is driven before the first cut, metres.
 pub(crate) const RUN_UP_M: f64 = 3.0;
 /// Options before the first one, at most.

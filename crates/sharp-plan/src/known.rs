@@ -108,10 +108,4 @@ impl KnownOptions {
     pub fn hand_over(&self, before: OptionId, after: OptionId) -> Option<&SuccessEstimate> {
         self.hand_overs.get(&(before, after))
     }
-
-    /// Options and hand-overs.
-    #[must_use]
-    pub fn counts(&self) -> (usize, usize) {
-        (self.guided.len(), self.hand_overs.len())
-    }
 }

@@ -85,7 +85,7 @@ pub use plan_file::{AbstractionFile, Plan, map_hash};
 pub use problem::PlanningProblem;
 pub use query::{Monitor, Phase, Query, QueryError};
 pub use recording::{Moment, Recording, record};
-pub use remote::{Instruction, Reading, RemoteDriver, RemoteStatus};
+pub use remote::{Instruction, MOVED, Reading, RemoteDriver, RemoteStatus, is_elsewhere, is_placed};
 pub use roster::{Area, Roster, RosterOption};
 pub use search::{Search, Unplaced};
 pub use sharp::{Answer, Sharp, SolveError};

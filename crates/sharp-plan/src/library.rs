@@ -170,13 +170,12 @@ impl LibraryKey<'_> {
             conditions += &format!(" {simulator:?}");
         }
         // The caution of the prior follows from the cost of a failure, and options keep their guides.
-        if let Some(usual) = Method::by_name(&method.name) {
-            if method.failure_cost_s.to_bits() != usual.failure_cost_s.to_bits() {
-                conditions += &format!(" failure {:?} s", method.failure_cost_s);
-            }
-            if method.search.guide.planner != usual.search.guide.planner {
-                conditions += &format!(" {:?}", method.search.guide.planner);
-            }
+        let usual = Method::by_name(&method.name).unwrap_or_default();
+        if method.failure_cost_s.to_bits() != usual.failure_cost_s.to_bits() {
+            conditions += &format!(" failure {:?} s", method.failure_cost_s);
+        }
+        if method.search.guide.planner != usual.search.guide.planner {
+            conditions += &format!(" {:?}", method.search.guide.planner);
         }
         // What was trained with other settings is another policy.
         if method.keeps_trainings {

@@ -238,7 +238,8 @@ fn stand_in(
     let [_, follower] =
         Pricer::new(world, &conditions.noise, method.search, method.failure_cost_s).policies();
     let LearntPolicy { policy, env_steps, .. } = policies.learnt(plan[leg].id);
-    let is_prior = matches!(policy, OptionPolicy::Network(_)) && *env_steps == 0;
+    let is_prior =
+        method.learner.has_stand_in() && matches!(policy, OptionPolicy::Network(_)) && *env_steps == 0;
     (plan[leg].id.role() != Role::Option && is_prior).then_some((leg, follower))
 }
 

@@ -156,6 +156,8 @@ struct StepFile {
     guide: GuidePath,
     #[serde(default, skip_serializing_if = "Departure::is_none")]
     departure: Departure,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    ends_in_passing: bool,
     policy: PolicyFile,
     verified: SuccessCount,
     mean_time_s: f64,
@@ -185,9 +187,13 @@ impl Plan {
     /// `abstraction`.
     ///
     /// # Errors
-    /// Returns an error that names the file that could not be written.
+    /// Returns an error that names the file that could not be written, or says that its options are of a family from
+    /// outside: no file holds those.
     pub fn save(&self, folder: &Path, abstraction: &AbstractionFile) -> Result<(), FileError> {
         let path = folder.join(PLAN_FILE);
+        if abstraction.kind == OptionKind::Custom {
+            return Err(FileError::content(&path, "options of a family from outside cannot be stored"));
+        }
         files::write_ron_under(&folder.join(ABSTRACTION_FILE), abstraction, &path)?;
         let steps = self.solution.steps.iter().map(|step| step_file(step, folder));
         let prior = self.world.own_prior.as_deref();
@@ -274,6 +280,7 @@ fn step_file(step: &PlannedOption, folder: &Path) -> Result<StepFile, FileError>
         to: option.to,
         guide: option.guide.clone(),
         departure: option.departure,
+        ends_in_passing: option.ends_in_passing,
         policy: PolicyFile::save(&learnt.policy, folder)?,
         verified: learnt.estimate.count,
         mean_time_s: learnt.estimate.mean_time_s,
@@ -314,6 +321,7 @@ fn planned_option(
     };
     let option = GuidedOption::new(space, file.id, (file.from, file.to), file.guide, goal)
         .with_departure(file.departure);
+    let option = GuidedOption { ends_in_passing: file.ends_in_passing, ..option };
     Ok(PlannedOption {
         option: Arc::new(option),
         learnt,

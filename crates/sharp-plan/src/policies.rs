@@ -53,6 +53,11 @@ impl<'a> Policies<'a> {
         self.stored(id).map_or(0, LearntPolicy::failed_trainings)
     }
 
+    /// What was measured of the leg called `id`.
+    pub(crate) fn estimate(&self, id: LegId) -> Option<SuccessEstimate> {
+        self.get(id).map(|learnt| learnt.estimate)
+    }
+
     /// The policy of an option that has one.
     pub(crate) fn learnt(&self, id: LegId) -> &LearntPolicy {
         self.get(id).expect("an option of a plan has a policy")

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use sharp_drive::World;
 use sharp_guide::GuidedOption;
 use sharp_rl::Progress;
-use sharp_space::{Occupancy, Pose};
+use sharp_space::{Cell, Heading, Occupancy, Pose};
 use thiserror::Error;
 
 use crate::learn::{LearningMonitor, LearntPolicy, TrainingFile, TrainingPoint};
@@ -18,6 +18,9 @@ pub struct Query {
     pub goal: Pose,
 }
 
+/// Directions in which a robot is tried to fit where it has no room to turn, and the angle between two of them, radians.
+const TURNS: u8 = 16;
+const TURN_RAD: f64 = std::f64::consts::TAU / TURNS as f64;
 /// What messages call a goal on the way.
 const VIA: &str = "via";
 
@@ -114,9 +117,17 @@ fn nearest_room(world: &World, pose: &Pose) -> String {
     let frame = world.grid.frame();
     let room_m = world.robot.footprint.circumscribed_radius_m() + 1.5 * frame.resolution_m;
     let field = world.geometry.clearance();
-    let fits = (0..frame.len()).map(|index| frame.cell(index)).filter(|&cell| field.at(cell) > room_m);
     let distance = |cell| (frame.center(cell) - pose.position).norm();
-    match fits.min_by(|&a, &b| distance(a).total_cmp(&distance(b))) {
+    let nearest = |fits: &dyn Fn(Cell) -> bool| {
+        let fitting = (0..frame.len()).map(|index| frame.cell(index)).filter(|&cell| fits(cell));
+        fitting.min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+    };
+    // In a narrow place it fits in some directions only.
+    let fits_somehow = |cell: Cell| {
+        let at = |turn: u8| Pose::at(frame.center(cell), Heading::new(f64::from(turn) * TURN_RAD));
+        (0..TURNS).any(|turn| world.geometry.is_free(at(turn)))
+    };
+    match nearest(&|cell| field.at(cell) > room_m).or_else(|| nearest(&fits_somehow)) {
         Some(cell) => {
             let point = frame.center(cell);
             format!(

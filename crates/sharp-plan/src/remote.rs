@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sharp_drive::{Command, Controller, Decision, Motion};
+use sharp_drive::{Command, Controller, Decision, Motion, World};
 use sharp_guide::LegId;
 use sharp_sim::{ActionSettings, Drive, RobotModel, RobotState};
 use sharp_space::{Heading, Pose, Vector, trig};
@@ -15,11 +15,14 @@ const BACKED_OFF_WITHIN_M: f64 = 0.02;
 /// Backing off is given up after so many times the actions that it should take: something is in the way.
 const PATIENCE: f64 = 3.0;
 
-/// A robot is taken to have been carried, or wrong about its place before, if it is further from its last pose than
-/// twice what it can drive in an action, and this much more, metres.
+/// A robot that moved more than this many times as far as its top speed allows did not drive there: its place jumped, which
+/// says nothing of its speed.
+const DRIVEN_FACTOR: f64 = 2.0;
+/// Where its place jumped by this much more, metres, it was carried, or wrong about its place before, and gets a new plan.
+/// A plan bears shorter jumps, because localisation is not exact.
 const CARRIED_M: f64 = 0.5;
 /// A robot that was lost is looked at again once it has moved further than this, metres, or turned further, radians.
-const MOVED: (f64, f64) = (0.1, 0.2);
+pub const MOVED: (f64, f64) = (0.1, 0.2);
 /// What a slower car turns says little of how it steers, metres per second.
 const STEERS_FROM_MPS: f64 = 0.1;
 
@@ -94,19 +97,14 @@ enum Pending {
     BackOff { from: Pose, distance_m: f64, actions: u32 },
 }
 
-/// A robot that moved this many times as far as its top speed allows was carried, not driven.
-const CARRIED_FACTOR: f64 = 2.0;
-
 impl Reading {
     /// The state of `robot`, if it was in the state `before` one action ago: motion that was not told is taken from there.
     #[must_use]
     pub fn state(&self, robot: &RobotModel, before: Option<&RobotState>) -> RobotState {
         let mut state = RobotState::at_rest(self.pose);
         let action_s = ActionSettings::default().action_s;
-        // A robot that went faster than it can was carried.
-        let is_driven = |before: &&RobotState| {
-            before.pose.distance_m(&self.pose) < CARRIED_FACTOR * robot.max_speed_mps * action_s
-        };
+        let is_driven =
+            |before: &&RobotState| before.pose.distance_m(&self.pose) < driven_max_m(robot, action_s);
         if let Some(before) = before.filter(is_driven) {
             state.velocity = before.pose.to_local(self.pose.position) / action_s;
             state.yaw_rate_radps = before.pose.heading.turn_to(self.pose.heading) / action_s;
@@ -166,14 +164,11 @@ impl RemoteDriver {
     /// The same for a robot that is now in `state`.
     pub fn answer_in(&mut self, state: RobotState) -> Instruction {
         let before = std::mem::replace(&mut self.state, state);
-        let driven_max_m =
-            CARRIED_FACTOR * self.robot.max_speed_mps * ActionSettings::default().action_s + CARRIED_M;
-        let is_carried = before.pose.distance_m(&state.pose) > driven_max_m;
-        let is_elsewhere = |at: Pose| {
-            let turned_rad = at.heading.turn_to(state.pose.heading).abs();
-            at.distance_m(&state.pose) > MOVED.0 || turned_rad > MOVED.1
-        };
-        if self.recovery && (is_carried || self.lost_at.is_some_and(is_elsewhere)) {
+        let action_s = ActionSettings::default().action_s;
+        let is_carried =
+            before.pose.distance_m(&state.pose) > driven_max_m(&self.robot, action_s) + CARRIED_M;
+        let was_moved = self.lost_at.is_some_and(|at| is_elsewhere(&at, &state.pose, MOVED));
+        if self.recovery && (is_carried || was_moved) {
             return self.carried();
         }
         if self.lost_at.is_some() {
@@ -258,6 +253,23 @@ impl RemoteDriver {
     fn instruction(&self, waypoint: Option<Pose>, speed_mps: f64, status: RemoteStatus) -> Instruction {
         Instruction { waypoint, speed_mps, option: self.policy.option().id, status }
     }
+}
+
+/// Returns true if a robot can be at `pose`: its middle is in the free space of the map.
+#[must_use]
+pub fn is_placed(world: &World, pose: &Pose) -> bool {
+    world.grid.frame().cell_at(pose.position).is_some_and(|cell| world.grid.is_free(cell))
+}
+
+/// Returns true if `now` is further from `at` than so many metres or radians.
+#[must_use]
+pub fn is_elsewhere(at: &Pose, now: &Pose, (moved_m, turned_rad): (f64, f64)) -> bool {
+    at.distance_m(now) > moved_m || at.heading.turn_to(now.heading).abs() > turned_rad
+}
+
+/// The longest way, metres, that `robot` may have driven in an action.
+fn driven_max_m(robot: &RobotModel, action_s: f64) -> f64 {
+    DRIVEN_FACTOR * robot.max_speed_mps * action_s
 }
 
 /// What came of an action that no policy commanded.
@@ -363,6 +375,24 @@ mod tests {
         assert!(nowhere.iter().all(|&status| status == RemoteStatus::Lost), "{nowhere:?}");
         assert_eq!(driver.policy.events().recoveries, 0);
         assert_eq!(driver.answer(&at(1.0, 2.2)).status, RemoteStatus::Recovering);
+    }
+
+    /// From Python a robot whose pose was inside a wall was told to drive on.
+    #[test]
+    fn a_robot_can_only_be_in_the_free_space_of_the_map() {
+        let plan = plan(OptionKind::Centroid);
+        for (x, expected) in [(1.0, true), (0.2, false), (-50.0, false), (1e300, false)] {
+            assert_eq!(is_placed(&plan.world, &Pose::new(x, 2.2, 0.0)), expected, "{x}");
+        }
+    }
+
+    #[test]
+    fn a_robot_is_elsewhere_once_it_moved_or_turned() {
+        let here = Pose::new(1.0, 2.2, 3.1);
+        let cases = [(1.0, 3.1, false), (1.05, 3.2, false), (1.15, 3.1, true), (1.0, -2.9, true)];
+        for (x, yaw, expected) in cases {
+            assert_eq!(is_elsewhere(&here, &Pose::new(x, 2.2, yaw), MOVED), expected, "{x}, {yaw}");
+        }
     }
 
     #[test]

@@ -50,7 +50,11 @@ pub(crate) fn repair(repair: &Repair<'_>, policies: &mut Policies<'_>) -> Result
         }
         let before: Vec<LearntPolicy> =
             repair.plan.iter().map(|option| policies.learnt(option.id).clone()).collect();
-        if !relearn_weak(repair, policies, &runs, (u64::from(round), &mut tried))? {
+        let is_better = relearn_weak(repair, policies, &runs, (u64::from(round), &mut tried))?;
+        if repair.problem.monitor.should_stop() {
+            return Ok(false);
+        }
+        if !is_better {
             break;
         }
         let anew = run_plan(repair, policies);

@@ -78,8 +78,10 @@ impl Roster {
     pub fn new(site: &LearningSite<'_>, within: Option<Area>) -> Self {
         let LearningSite { world, abstraction, method, conditions, seed } = *site;
         let Abstraction { states, options } = abstraction;
-        let anywhere = states.states().next().map_or(Point::origin(), |state| states.center(state));
-        // The options of a building depend on no query; the search needs one all the same.
+        // The options of a building depend on no query; the search needs one all the same, in a state that has cells.
+        let mut centers = states.states().map(|state| (state, states.center(state)));
+        let anywhere = centers.find(|&(state, center)| states.state_at(center) == Some(state));
+        let anywhere = anywhere.map_or(Point::origin(), |(_, center)| center);
         let query = Query {
             start: Pose::new(anywhere.x, anywhere.y, 0.0),
             goal: Pose::new(anywhere.x, anywhere.y, 0.0),

@@ -237,6 +237,24 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// The plan that goes from start to goal without any option, if it is offered and has a guide, with its cost in seconds.
+    pub fn direct(
+        &mut self,
+        measured: &dyn Fn(LegId) -> Option<SuccessEstimate>,
+        monitor: &dyn Monitor,
+    ) -> Option<(f64, Vec<Arc<GuidedOption>>)> {
+        if !self.offers_direct {
+            return None;
+        }
+        if self.found(LegId::Direct).is_none() {
+            monitor.phase(Phase::Guide);
+            self.guide_while(&[LegId::Direct], &|| !monitor.should_stop());
+        }
+        let option = Arc::clone(self.found(LegId::Direct)?.ok()?);
+        let candidate = self.graph.candidate(LegId::Direct)?;
+        Some((self.cost_s(candidate, measured(LegId::Direct)), vec![option]))
+    }
+
     /// From now on guides are planned with all patience, those too that were not found in haste. Returns false if that changes
     /// nothing: there is no hasty planner, or no robot of this width gets from start to goal.
     fn be_patient(&mut self) -> bool {
@@ -378,7 +396,7 @@ impl<'a> Search<'a> {
         };
         let turn = first.guide.end().heading.turn_to(second.guide.start().heading).abs();
         let robot = &self.world.robot;
-        let turn_s = turn / (robot.max_yaw_rate_radps * robot.yaw_gain());
+        let turn_s = turn / robot.max_yaw_rate_radps;
         let clearance_m = self.world.geometry.clearance().sample(after.option.start);
         if turn <= self.smooth_turn_rad(clearance_m) {
             return turn_s;
@@ -431,6 +449,11 @@ impl<'a> Search<'a> {
         let start = self.query.start.position;
         let is_beyond = at_once.as_ref().is_err_and(|reason| reason.is_beyond(start, DEPARTURE_REACH_M));
         let is_settled = is_beyond || (chosen.is_some() && (at_once.is_ok() || id == LegId::Direct));
+        if let Some(way) =
+            self.least_bad.get().filter(|_| chosen == Some(None) && self.chosen.get().is_none())
+        {
+            self.seen_to_fail.lock().expect("no panic").insert(id, way.success);
+        }
         if !self.settings.departures || is_settled || (!is_tight && at_once.as_ref().is_ok_and(leaves_well)) {
             return at_once.map(Arc::new);
         }

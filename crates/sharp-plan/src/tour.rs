@@ -286,8 +286,10 @@ impl TourPolicy {
         let pose = &self.current.observation().state.pose;
         let end = self.current.option().guide.end().position;
         let command = Command::of(pose, end, 0.0);
-        let speed_mps = (command.reach_m / (2.0 * ActionSettings::default().action_s)).min(APPROACH_MPS);
-        Command { speed_mps, ..command }
+        let world = &self.current.plan().world;
+        let slowly_mps = APPROACH_MPS.min(world.robot.max_speed_mps);
+        let speed_mps = (command.reach_m / (2.0 * ActionSettings::default().action_s)).min(slowly_mps);
+        world.held(pose, Command { speed_mps, ..command })
     }
 
     /// How far the present plan is: the number of its leg, from 0, and the share of its guide that is driven.

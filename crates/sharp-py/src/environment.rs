@@ -45,6 +45,7 @@ pub(crate) struct Tasks {
 
 struct Slot {
     task: OptionTask,
+    has_begun: bool,
     stream: Stream,
     observation: Vec<f32>,
     step: Step,
@@ -70,6 +71,7 @@ impl Tasks {
         let source = Arc::new(SingleOption { scenario, states: Arc::new(states) });
         let slot = |index: usize| Slot {
             task: OptionTask::new(source.clone(), Seed(1)),
+            has_begun: false,
             stream: Stream::seed_from_u64(index as u64),
             observation: vec![0.0; observation_len],
             step: Step::default(),
@@ -102,7 +104,7 @@ impl Tasks {
         if let Some(seed) = seed {
             slot.stream = Stream::seed_from_u64(seed);
         }
-        slot.task.reset(&mut slot.stream, &mut slot.observation);
+        slot.begin();
         Ok(to_bytes(py, &slot.observation))
     }
 
@@ -120,7 +122,10 @@ impl Tasks {
         let result = py.detach(|| {
             let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
             if actions.len() != wanted || begins.len() != slots.len() {
-                return None;
+                return Err(format!("{} numbers of actions, expected {wanted}", actions.len()));
+            }
+            if slots.iter().zip(begins).any(|(slot, begins)| !slot.has_begun && *begins != 1) {
+                return Err("reset comes before step".to_owned());
             }
             let given = actions.par_chunks_exact(PolicyInterface::ACTION_LEN).zip(begins);
             let each = slots.par_iter_mut().zip(given);
@@ -129,20 +134,22 @@ impl Tasks {
                 slots.iter().flat_map(|slot| slot.observation.iter().copied()).collect();
             let rewards: Vec<f32> = slots.iter().map(|slot| slot.step.reward).collect();
             let flags: Vec<u8> = slots.iter().map(|slot| flags(&slot.step)).collect();
-            Some((observations, rewards, flags))
+            Ok((observations, rewards, flags))
         });
-        let Some((observations, rewards, flags)) = result else {
-            let message = format!("{} numbers of actions, expected {wanted}", actions.len());
-            return Err(Raised::new("USAGE", message));
-        };
+        let (observations, rewards, flags) = result.map_err(|message| Raised::new("USAGE", message))?;
         Ok((to_bytes(py, &observations), to_bytes(py, &rewards), PyBytes::new(py, &flags)))
     }
 }
 
 impl Slot {
+    fn begin(&mut self) {
+        self.task.reset(&mut self.stream, &mut self.observation);
+        self.has_begun = true;
+    }
+
     fn step(&mut self, action: &[f32], begins: bool) {
         if begins {
-            self.task.reset(&mut self.stream, &mut self.observation);
+            self.begin();
             self.step = Step::default();
         } else {
             let action: Vec<f32> = action.iter().map(|part| part.clamp(-1.0, 1.0)).collect();

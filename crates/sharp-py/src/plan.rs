@@ -9,7 +9,7 @@ use sharp_bench::{RunReport, Solved, clock_us, named, pictures, to_json};
 use sharp_drive::{EpisodeEnd, OptionPolicy};
 use sharp_export::{PlanNetwork, PlannedPath, RouteGraph, driven_mcap, networks, planned_mcap};
 use sharp_maps::{LoadOptions, load};
-use sharp_plan::{Execution, Moment, Plan, Recording, RunSettings, record, write_atomic};
+use sharp_plan::{Execution, Moment, Plan, Recording, RunSettings, Tour, record, write_atomic};
 use sharp_space::Seed;
 
 use crate::error::Raised;
@@ -49,7 +49,16 @@ impl PyPlan {
         let spec =
             map.to_str().ok_or_else(|| Raised::new("FILE_INVALID", "the folder's name is not printable"))?;
         let grid = load(spec, &LoadOptions::default())?.grid;
-        Ok(Self { plan: Arc::new(Plan::load(&folder, grid)?), solved: None })
+        let plans = Tour::load(&folder, &grid)?.plans;
+        let [plan] = &plans[..] else {
+            let message = format!(
+                "{} has {} goals in a row, name one of its folders goal-N",
+                folder.display(),
+                plans.len()
+            );
+            return Err(Raised::new("USAGE", message));
+        };
+        Ok(Self { plan: Arc::clone(plan), solved: None })
     }
 
     /// Writes plan, map, pictures and report into `folder`, as `sharp solve` does.

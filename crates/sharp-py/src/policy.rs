@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use sharp_drive::{NetworkPolicy, PolicyInterface};
-use sharp_plan::{Instruction, Plan, Reading, RemoteDriver};
+use sharp_plan::{Instruction, Plan, Reading, RemoteDriver, RemoteStatus, is_placed};
 use sharp_rl::{Actor, ActorScratch};
 
 use crate::error::Raised;
@@ -92,13 +92,23 @@ impl PyDriver {
 #[pymethods]
 impl PyDriver {
     /// What a robot at `at` does next. Speed and yaw rate that are not told come from the last two poses.
-    fn act(&self, at: Triple, speed: Option<f64>, yaw_rate: Option<f64>) -> Answer {
+    fn act(&self, at: Triple, speed: Option<f64>, yaw_rate: Option<f64>) -> Result<Answer, Raised> {
+        for (name, number) in [("speed", speed), ("yaw_rate", yaw_rate)] {
+            if let Some(number) = number.filter(|number| !number.is_finite()) {
+                let message = format!("{name} is {number}, expected a finite number");
+                return Err(Raised::new("POSE_INVALID", message));
+            }
+        }
         let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
         let reading = Reading { pose: pose(at), speed_mps: speed, yaw_rate_radps: yaw_rate };
+        // What it knew of the robot before stays, for the next pose may be a real one again.
+        if !is_placed(&self.plan.world, &reading.pose) {
+            return Ok((None, 0.0, String::new(), RemoteStatus::Lost.name()));
+        }
         let begin = || RemoteDriver::new(vec![Arc::clone(&self.plan)], &reading, self.recovery);
         let Instruction { waypoint, speed_mps, option, status } =
             running.get_or_insert_with(begin).answer(&reading);
         let waypoint = waypoint.map(|pose| (pose.position.x, pose.position.y));
-        (waypoint, speed_mps, option.to_string(), status.name())
+        Ok((waypoint, speed_mps, option.to_string(), status.name()))
     }
 }

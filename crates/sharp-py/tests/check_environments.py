@@ -66,12 +66,23 @@ for _ in range(300):
         ends += over[slot]
 assert ends > 3, f"{ends} episodes ended"
 
+# Seeds may be numbers of NumPy; a list has one for each slot.
+seen, _ = vector.reset(seed=11)
+for seed in (np.int64(11), [11, 12, 13, 14], np.arange(11, 15)):
+    assert (vector.reset(seed=seed)[0] == seen).all(), seed
+assert (sharp.OptionEnv(plan, 0).reset(seed=np.int64(11))[0] == seen[0]).all()
+
 for call in (
     lambda: sharp.OptionEnv(plan, 99),
     lambda: sharp.OptionEnv(plan, 0, reward="gold"),
     lambda: sharp.ProblemEnv(plan, observation="lidar"),
     lambda: sharp.VectorEnv(plan, 0),
     lambda: vector.step(np.zeros((count + 1, 2))),
+    lambda: vector.reset(seed=[1] * (count - 1)),
+    lambda: vector.reset(seed=[1] * (count + 1)),
+    # It was a panic.
+    lambda: sharp.OptionEnv(plan, 0).step(np.zeros(2)),
+    lambda: sharp.VectorEnv(plan, count, leg=0).step(np.zeros((count, 2))),
 ):
     try:
         call()

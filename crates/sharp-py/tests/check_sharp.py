@@ -140,6 +140,13 @@ driver = plan.driver()
 waypoint = driver.act(plan.start)
 assert waypoint.status == "running" and waypoint.speed > 0 and len(waypoint.position) == 2
 assert plan.driver().act((*plan.goal[:2], 0.0)).option
+# In a wall or off the map it is lost, as for `sharp serve`, and what is known of the robot stays.
+for nowhere in ((6.1, 1.0, 0.0), (-50.0, 0.0, 0.0)):
+    for asked in (driver, plan.driver()):
+        assert asked.act(nowhere) == sharp.Waypoint(None, 0.0, "", "lost"), nowhere
+assert driver.act(plan.start).status in ("running", "recovering")
+raises("POSE_INVALID", lambda: driver.act(plan.start, speed=float("nan")))
+raises("POSE_INVALID", lambda: driver.act(plan.start, yaw_rate=float("inf")))
 
 print(plan)
 print("all checks passed")

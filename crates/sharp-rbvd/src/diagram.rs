@@ -334,7 +334,9 @@ pub enum RbvdError {
     #[error(transparent)]
     Cells(#[from] StateGridError),
     /// There is no room for a state.
-    #[error("no part of the map with {min_clearance_m} m of clearance has a region or the size of a state")]
+    #[error(
+        "no part of the map with {min_clearance_m:.3} m of clearance has a region or the size of a state"
+    )]
     NoRoom {
         /// The clearance asked for, metres.
         min_clearance_m: f64,

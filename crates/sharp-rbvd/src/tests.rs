@@ -350,7 +350,7 @@ fn broken_input_is_refused_with_the_culprit() {
     outside[1].cells.push(Cell::new(0, 7));
     assert_eq!(refused(&outside, &settings), "region 1 has a cell in column 0, row 7, outside the grid");
     let wide = RbvdSettings { min_clearance_m: 2.0, ..settings.clone() };
-    let message = "no part of the map with 2 m of clearance has a region or the size of a state";
+    let message = "no part of the map with 2.000 m of clearance has a region or the size of a state";
     assert_eq!(refused(&regions, &wide), message);
     assert_eq!(Rbvd::build(&field, &[], &settings).unwrap().len(), 1, "no region at all is no error");
 }

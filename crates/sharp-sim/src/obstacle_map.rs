@@ -34,8 +34,8 @@ impl ObstacleMap {
         Self::with_geometry(grid, Arc::new(FootprintChecker::new(grid, footprint)))
     }
 
-    /// Prepares `grid` for a robot whose outline `geometry` tests. Engines with contacts take the rectangle
-    /// around the outline, [`RobotGeometry::footprint`].
+    /// Prepares `grid` for a robot whose outline `geometry` tests. Engines with contacts take the outline that it
+    /// says, [`RobotGeometry::footprint`].
     ///
     /// # Panics
     /// If `geometry` belongs to another grid.

@@ -55,7 +55,7 @@ impl PlanarSim {
     #[must_use]
     pub fn new(map: Arc<ObstacleMap>, robot: &RobotModel) -> Self {
         let body = PlanarBody {
-            footprint: robot.footprint,
+            footprint: *map.checker().footprint(),
             mass_kg: robot.mass_kg,
             yaw_inertia_kgm2: robot.yaw_inertia_kgm2,
         };

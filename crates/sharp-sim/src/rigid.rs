@@ -18,7 +18,7 @@ use rapier3d::geometry::{
 };
 use rapier3d::math::{Pose as EnginePose, Rotation, Vector as EngineVector};
 use rapier3d::pipeline::PhysicsPipeline;
-use sharp_space::{Heading, Pose, Vector, trig};
+use sharp_space::{Footprint, Heading, Pose, Vector, trig};
 
 use crate::contact::ContactGuard;
 use crate::obstacle_map::ObstacleMap;
@@ -66,7 +66,7 @@ impl RigidSim {
     /// A robot at rest at the grid's origin.
     #[must_use]
     pub fn new(map: Arc<ObstacleMap>, robot: &RobotModel) -> Self {
-        let build = RigidBodies::new(robot);
+        let build = RigidBodies::new(robot, map.checker().footprint());
         let state = RobotState::at_rest(map.frame().origin);
         let walls = extrude(&map);
         Self {
@@ -159,14 +159,14 @@ struct RigidBodies {
 }
 
 impl RigidBodies {
-    fn new(robot: &RobotModel) -> Self {
+    fn new(robot: &RobotModel, footprint: &Footprint) -> Self {
         // A second axle close by stands in for casters.
         let wheelbase_m = robot.wheelbase_m().max(WHEELBASE_MIN_SHARE * robot.track_m());
         let (x, y) = (wheelbase_m / 2.0, robot.track_m() / 2.0);
         let wheel_radius_m = WHEEL_RADIUS_SHARE * robot.track_m().min(wheelbase_m);
         let wheel_kg = WHEEL_MASS_SHARE * robot.mass_kg;
         let chassis_kg = robot.mass_kg - 4.0 * wheel_kg;
-        let (half_length, half_width) = (robot.footprint.half_length_m(), robot.footprint.half_width_m());
+        let (half_length, half_width) = (footprint.half_length_m(), footprint.half_width_m());
         let half_height = half_width / 2.0;
         let ball = 0.4 * wheel_kg * wheel_radius_m * wheel_radius_m;
         // The wheels' share of the robot's inertia lies where the wheels are.

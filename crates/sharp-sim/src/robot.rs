@@ -202,8 +202,7 @@ impl RobotModel {
     /// that is easier to turn than two point masses at the wheels would overshoot by more than the slip, and its
     /// motion would diverge.
     pub(crate) fn least_inertia_kgm2(&self) -> f64 {
-        let least = 0.5 * self.mass_kg * 0.25 * (self.wheelbase_m().powi(2) + self.track_m().powi(2));
-        (least * 1e3).ceil() / 1e3
+        0.5 * self.mass_kg * 0.25 * (self.wheelbase_m().powi(2) + self.track_m().powi(2))
     }
 
     /// The tightest turn of the rear axle's middle, metres; 0 for a robot that turns in place.
@@ -269,7 +268,10 @@ impl RobotModel {
             positive("drive.steer_rate_radps", steer_rate_radps, 100.0)?;
         }
         positive("mass_kg", self.mass_kg, 1e5)?;
-        self.require("yaw_inertia_kgm2", self.yaw_inertia_kgm2, self.least_inertia_kgm2(), 1e6)?;
+        let least = self.least_inertia_kgm2();
+        // A message with all digits of the bound would be hard to read.
+        let least = if self.yaw_inertia_kgm2 < least { four_digits_up(least) } else { least };
+        self.require("yaw_inertia_kgm2", self.yaw_inertia_kgm2, least, 1e6)?;
         positive("wheel_friction", self.wheel_friction, 10.0)?;
         positive("max_speed_mps", self.max_speed_mps, 100.0)?;
         positive("max_accel_mps2", self.max_accel_mps2, 1000.0)?;
@@ -293,6 +295,12 @@ impl RobotModel {
         };
         Err(RobotError::Value { robot: self.name.clone(), field, value, expected })
     }
+}
+
+/// `value`, positive, rounded up to four digits.
+fn four_digits_up(value: f64) -> f64 {
+    let scale = 10_f64.powf(3.0 - value.log10().floor());
+    (value * scale).ceil() / scale
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Maps drawn as text: `#` occupied, `.` or space free, `?` unknown; the first row is the top.
+//! Maps drawn as text: `#` occupied, `.` free, `?` unknown; the first row is the top.
 
 use std::fmt;
 
@@ -8,8 +8,7 @@ use crate::pose::Pose;
 impl OccupancyGrid {
     /// Reads a drawn map whose lower-left corner lies at the world's origin.
     ///
-    /// Leading and trailing blank lines and the common indentation are ignored, so that maps can
-    /// be drawn inside tests.
+    /// Blank lines and blanks around a row are ignored, so that maps can be drawn inside tests.
     ///
     /// # Errors
     /// Returns an error that names the first row that is too short, too long or unreadable.
@@ -25,7 +24,7 @@ impl OccupancyGrid {
             for (col, found) in line.chars().enumerate() {
                 cells.push(match found {
                     '#' => Occupancy::Occupied,
-                    '.' | ' ' => Occupancy::Free,
+                    '.' => Occupancy::Free,
                     '?' => Occupancy::Unknown,
                     _ => return Err(GridError::Character { row, col, found }),
                 });

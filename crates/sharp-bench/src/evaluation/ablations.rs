@@ -17,54 +17,28 @@ const HEADER: f64 = 20.0;
 pub(super) struct Ablation {
     pub(super) name: &'static str,
     change: fn(Setting<'_>) -> Setting<'_>,
-    /// The flags of `sharp eval` that measure it.
-    pub(super) flags: &'static str,
 }
 
 /// All of them, in the order of the figure.
 pub(super) const ABLATIONS: [Ablation; 7] = [
-    Ablation {
-        name: "regions by geometry",
-        change: |setting| Setting { regions: "geometric", ..setting },
-        flags: "--regions geometric",
-    },
-    Ablation {
-        name: "regions on a grid",
-        change: |setting| Setting { regions: "grid", ..setting },
-        flags: "--regions grid",
-    },
-    Ablation {
-        name: "regions at random",
-        change: |setting| Setting { regions: "random", ..setting },
-        flags: "--regions random",
-    },
-    Ablation {
-        name: "no cost update",
-        change: |setting| Setting { variant: "no_cost_update", ..setting },
-        flags: "--cost-update off",
-    },
-    Ablation {
-        name: "no recovery",
-        change: |setting| Setting { variant: "no_recovery", ..setting },
-        flags: "--recovery off",
-    },
-    Ablation {
-        name: "prior only",
-        change: |setting| Setting { learning: "prior", ..setting },
-        flags: "--learning prior",
-    },
-    Ablation {
-        name: "the paper's learning",
-        change: |setting| Setting { learning: "paper", ..setting },
-        flags: "--learning paper",
-    },
+    Ablation { name: "regions by geometry", change: |setting| Setting { regions: "geometric", ..setting } },
+    Ablation { name: "regions on a grid", change: |setting| Setting { regions: "grid", ..setting } },
+    Ablation { name: "regions at random", change: |setting| Setting { regions: "random", ..setting } },
+    Ablation { name: "no cost update", change: |setting| Setting { variant: "no_cost_update", ..setting } },
+    Ablation { name: "no recovery", change: |setting| Setting { variant: "no_recovery", ..setting } },
+    Ablation { name: "prior only", change: |setting| Setting { learning: "prior", ..setting } },
+    Ablation { name: "the paper's learning", change: |setting| Setting { learning: "paper", ..setting } },
 ];
 
 impl Ablation {
-    /// What was measured of it; empty if that is the main setting itself.
+    /// The setting `main` without the part; `None` if the part is not in it.
+    pub(super) fn setting<'a>(&self, main: Setting<'a>) -> Option<Setting<'a>> {
+        Some((self.change)(main)).filter(|&changed| changed != main)
+    }
+
+    /// What was measured of it.
     pub(super) fn lines<'a>(&self, results: &Results<'a>) -> Vec<&'a ResultLine> {
-        let setting = (self.change)(results.main);
-        if setting == results.main { vec![] } else { results.sharp(setting) }
+        self.setting(results.main).map_or(vec![], |setting| results.sharp(setting))
     }
 }
 

@@ -6,6 +6,7 @@ use sharp_drive::SuccessCount;
 
 use super::figure::Style;
 use crate::result::ResultLine;
+use crate::shell::shell_word;
 
 /// How a result of SHARP was made, apart from its problem, its kind of option and its trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -24,6 +25,23 @@ impl<'a> Setting<'a> {
     pub(super) fn of(line: &'a ResultLine) -> Self {
         let ResultLine { learning, regions, noise, variant, .. } = line;
         Self { learning, regions, noise, variant }
+    }
+
+    /// The flags of `sharp eval` that ask for it, each after a space; none for what is usual.
+    pub(super) fn flags(&self) -> String {
+        let Self { learning, regions, noise, variant } = *self;
+        let switch = |off: &str| if variant.split('+').any(|part| part == off) { "off" } else { "on" };
+        [
+            ("learning", learning, Self::USUAL.learning),
+            ("regions", regions, Self::USUAL.regions),
+            ("noise", noise, Self::USUAL.noise),
+            ("recovery", switch("no_recovery"), "on"),
+            ("cost-update", switch("no_cost_update"), "on"),
+        ]
+        .into_iter()
+        .filter(|(_, value, usual)| value != usual)
+        .map(|(flag, value, _)| format!(" --{flag} {}", shell_word(value)))
+        .collect()
     }
 }
 

@@ -12,6 +12,10 @@ use crate::measure::BaselineKind;
 use crate::named::{self, DETECTORS};
 use crate::result::{Variant, default_regions};
 
+/// The readable part of the name of a job at most, characters: with what follows it is well below the 255 bytes of a file
+/// system.
+const WORDS_MAX: usize = 100;
+
 /// A system in an environment: equal experiments give equal results but for times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -190,22 +194,22 @@ impl Experiment {
     /// A name for files: readable, and of this experiment only.
     #[must_use]
     pub fn name(&self) -> String {
-        let mut words = vec![self.env.clone(), self.robot.clone()];
+        let variant = self.variant().name();
+        let mut words = vec![&*self.env, &*self.robot];
         match self.system.sharp() {
             Some(sharp) => {
-                words.extend([sharp.options.name().to_owned(), sharp.learning.clone()]);
+                words.extend([sharp.options.name(), &*sharp.learning]);
                 if sharp.regions != default_regions() {
-                    words.push(sharp.regions.clone());
+                    words.push(&sharp.regions);
                 }
                 if self.variant() != Variant::WHOLE {
-                    words.push(self.variant().name());
+                    words.push(&variant);
                 }
             }
-            None => words.push(self.system.name().to_owned()),
+            None => words.push(self.system.name()),
         }
-        words.extend([self.noise.clone(), format!("t{}", self.trial), self.key()[..8].to_owned()]);
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-        words.join("-").chars().map(|c| if is_plain(c) { c } else { '_' }).collect()
+        words.push(&self.noise);
+        file_name(&words, &format!("t{}-{}", self.trial, &self.key()[..8]))
     }
 
     /// What was switched off.
@@ -281,6 +285,22 @@ impl Experiment {
     }
 }
 
+/// A name for files out of `words`, some of which may be paths, and `tail`, which tells it from others. It fits into every
+/// file system, however long the words are.
+pub(super) fn file_name(words: &[&str], tail: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let words: Vec<&str> = words.iter().map(|word| stem(word)).collect();
+    let all = words.join("-");
+    let readable: String = all.chars().map(|c| if is_plain(c) { c } else { '_' }).take(WORDS_MAX).collect();
+    format!("{readable}-{tail}")
+}
+
+/// Of a robot, noise or regions that are a file, its name without folder and ending.
+fn stem(word: &str) -> &str {
+    let file = word.rsplit('/').next().unwrap_or(word);
+    file.strip_suffix(".ron").unwrap_or(file)
+}
+
 /// `what` is now `is`, and the job was planned for `planned`.
 pub(super) fn stale(what: String, is: &str, planned: &str) -> BenchError {
     BenchError::Stale { what, is: is.to_owned(), planned: planned.to_owned() }
@@ -318,7 +338,20 @@ mod tests {
     fn names_can_be_files() {
         let example = Experiment { noise: "../my noise*2.ron".into(), ..Experiment::example() };
         let name = example.name();
-        assert!(name.starts_with("a-husky-interface-fast-.._my_noise_2.ron-t0-"), "{name}");
+        assert!(name.starts_with("a-husky-interface-fast-my_noise_2-t0-"), "{name}");
+        let factor = Experiment { noise: "nominal*0.5".into(), ..Experiment::example() };
+        assert!(factor.name().starts_with("a-husky-interface-fast-nominal_0.5-t0-"), "{}", factor.name());
+    }
+
+    // A noise file far below the root once gave a name that no file system takes, which showed when the job ran.
+    #[test]
+    fn long_names_are_cut_and_stay_apart() {
+        let [one, other] = ["1", "2"].map(|end| Experiment {
+            noise: format!("/runs/{}{end}.ron", "long".repeat(60)),
+            ..Experiment::example()
+        });
+        assert!(one.name().len() < 120, "{}", one.name());
+        assert_ne!(one.name(), other.name());
     }
 
     #[test]

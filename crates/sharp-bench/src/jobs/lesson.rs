@@ -18,7 +18,7 @@ use sharp_sim::SimulatorKind;
 use sharp_space::Point;
 
 use super::engine::EngineMonitor;
-use super::experiment::{Inputs, stale};
+use super::experiment::{Inputs, file_name, stale};
 use super::machine::version;
 use super::manifest::Job;
 use super::work::Ended;
@@ -147,10 +147,8 @@ impl Lesson {
     pub fn name(&self) -> String {
         let Self { map, robot, options, round, part: [index, count], .. } = self;
         let round = if *round == LessonRound::Options { "options" } else { "hand-overs" };
-        let name =
-            format!("learn-{map}-{robot}-{}-{round}-{index}-of-{count}-{}", options.name(), &self.key()[..8]);
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-        name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect()
+        let tail = format!("{}-{round}-{index}-of-{count}-{}", options.name(), &self.key()[..8]);
+        file_name(&["learn", map, robot], &tail)
     }
 
     /// Processor time that the lesson is expected to take, seconds; for packing and order only.

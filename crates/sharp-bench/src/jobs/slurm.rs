@@ -18,6 +18,7 @@ use super::engine::{Engine, EngineMonitor};
 use super::manifest::{Job, Manifest};
 use super::merge::{count_results, unfinished};
 use crate::error::BenchError;
+use crate::shell::shell_word;
 
 /// Seconds before the end of a task's time at which it is asked to stop: enough to write what is done.
 const WARNING_S: u32 = 30;
@@ -259,9 +260,7 @@ fn head(options: &[String]) -> String {
 
 /// `path` as one word of a shell.
 fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-%+=:,".contains(c);
-    if text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    shell_word(&path.display().to_string())
 }
 
 #[cfg(test)]

@@ -293,6 +293,8 @@ fn with_baseline(line: ResultLine, report: &BaselineReport) -> ResultLine {
     let times = report.time_s;
     ResultLine {
         status: report.status.to_owned(),
+        // Without a path all executions have failed, and none was driven.
+        episodes: if report.status == "no_plan" { line.episodes } else { report.episodes },
         successes: report.successes,
         collisions: report.collisions,
         timeouts: report.timeouts,
@@ -310,5 +312,25 @@ fn with_baseline(line: ResultLine, report: &BaselineReport) -> ResultLine {
             ..SolveTimes::default()
         },
         ..line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::{System, merge};
+
+    // Stopped executions were no episodes in the report of a baseline, and failures in its line.
+    #[test]
+    fn a_baseline_that_was_out_of_time_has_the_episodes_that_it_drove() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (system, problems) = (System::Track, vec![1]);
+        let experiment = Experiment { system, problems, time_limit_s: 1e-9, ..Experiment::example() };
+        let (manifest, _) = Manifest::extend(folder.path(), vec![experiment], "call").expect("a plan");
+        assert_eq!(run_job(&manifest, 0, &()).expect("a job"), Ended::Done);
+        let merged = merge(&manifest).expect("results");
+        let lines: Vec<_> =
+            merged.lines().map(|line| (&*line.status, line.episodes, line.successes)).collect();
+        assert_eq!(lines, [("timeout", 0, 0)]);
     }
 }

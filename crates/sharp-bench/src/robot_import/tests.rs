@@ -149,6 +149,7 @@ fn what_cannot_be_assumed_is_asked_for() {
         ("<model/>", "begins with <model>"),
         ("<robot>", "is no valid XML"),
         ("a: [", "is no valid YAML"),
+        ("robot_radius: 0.2\n---\nmax_vel_x: 1\n", "holds several YAML documents"),
         ("just words", "is neither URDF"),
         ("robot_radius: -1\nmax_vel_x: 1\n", "robot_radius: footprint radius_m is -1 m"),
         ("footprint: \"[[1, 2]]\"\nmax_vel_x: 1\n", "footprint: footprint has"),

@@ -3,6 +3,8 @@
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_saphyr::Error;
+use serde_saphyr::budget::BudgetBreach;
 use serde_saphyr::options::{DuplicateKeyPolicy, MergeKeyPolicy, NonFiniteFloatPolicy};
 
 /// A value without entries of its own.
@@ -34,7 +36,12 @@ impl Yaml {
             non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
         };
         serde_saphyr::from_str_with_options(text, options).map_err(|error| {
-            format!("is no valid YAML: {}", error.without_snippet().to_string().replace('\n', " "))
+            let error = error.without_snippet();
+            if matches!(error, Error::Budget { breach: BudgetBreach::Documents { .. }, .. }) {
+                return "holds several YAML documents, expected one: make each a file and name all of them"
+                    .to_owned();
+            }
+            format!("is no valid YAML: {}", error.to_string().replace('\n', " "))
         })
     }
 

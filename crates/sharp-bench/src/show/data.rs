@@ -33,6 +33,8 @@ pub(super) struct ShownData {
     predicted: ShownPrediction,
     states: Vec<ShownState>,
     options: Vec<ShownOption>,
+    /// Whether there was a library to ask what is known of the options.
+    library: bool,
     legs: Vec<ShownLeg>,
     runs: ShownRuns,
     drives: Vec<ShownDrive>,
@@ -70,8 +72,26 @@ pub(super) struct ShownOutline {
     goal_tolerance_m: f64,
 }
 
+/// Where it is known from how often a plan holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Basis {
+    /// From runs of the whole.
+    Runs,
+    /// From what its parts are known to hold: nobody ran it.
+    Composed,
+}
+
+impl Basis {
+    pub(super) const fn of(plan: &Plan) -> Self {
+        if plan.solution.composed.is_some() { Self::Composed } else { Self::Runs }
+    }
+}
+
 #[derive(Debug, Serialize)]
 struct ShownPrediction {
+    /// Composed, `episodes` are as many runs as would tell as much.
+    basis: Basis,
     episodes: u32,
     success: f64,
     lower95: f64,
@@ -112,6 +132,8 @@ struct ShownLearnt {
 struct ShownLeg {
     #[serde(flatten)]
     report: OptionReport,
+    /// Where the report's counts are from.
+    basis: Basis,
     /// The goal that it leads to, from 0.
     goal: usize,
     /// Its guide.
@@ -162,6 +184,8 @@ impl ShownData {
             start: pose(&first.solution.query.start),
             goals: tour.plans.iter().map(|plan| place(plan.solution.query.goal.position)).collect(),
             predicted: ShownPrediction {
+                // A tour was run whatever its plans are made of.
+                basis: if tour.plans.len() == 1 { Basis::of(first) } else { Basis::Runs },
                 episodes: tour.predicted.episodes,
                 success: tour.predicted_success(),
                 lower95: tour.predicted_lower95(),
@@ -169,6 +193,7 @@ impl ShownData {
             },
             states: states(first),
             options: options(first, shown.library),
+            library: shown.library.is_some(),
             runs: ShownRuns {
                 episodes: recordings.len(),
                 reached: ends(EpisodeEnd::Reached),
@@ -254,6 +279,7 @@ fn shown_legs(shown: &PlanPage<'_>) -> Vec<ShownLeg> {
         let reports = OptionReport::all(plan).into_iter().zip(&plan.solution.steps);
         reports.map(move |(report, step)| ShownLeg {
             report,
+            basis: Basis::of(plan),
             goal,
             guide: points(&step.option.guide),
             tightest: tightest(&plan.world, &step.option.guide),

@@ -338,14 +338,15 @@ const percent = share => (100 * share).toFixed(1) + '\u00a0%';
 const seconds = value => value === undefined || value === null ? 'unknown time' : value.toFixed(1) + ' s';
 function legLines(leg) {
   const { on_arrival } = leg;
+  // Composed odds have no runs of legs.
   return [`${leg.length_m.toFixed(1)} m in ${seconds(leg.time_s)}, cost ${leg.cost_s === null ? 'infinite' : seconds(leg.cost_s)}`,
-    `succeeds ${on_arrival.successes} of ${on_arrival.episodes} on arrival (at least ${percent(on_arrival.lower95)})`,
+    ...leg.basis === 'composed' ? [] : [`succeeds ${on_arrival.successes} of ${on_arrival.episodes} on arrival (at least ${percent(on_arrival.lower95)})`],
     `policy: ${leg.policy}${leg.reused ? ', from the library' : ''}`,
     `tightest: ${leg.tightest.beside_m.toFixed(2)} m beside the robot`];
 }
 function optionLines(option) {
   const it = option.learnt;
-  if (!it) return ['not learnt yet, not in the plan'];
+  if (!it) return [data.library ? 'not learnt yet, not in the plan' : 'not in the plan'];
   return [`${it.length_m.toFixed(1)} m in ${seconds(it.time_s)}, cost ${it.cost_s === null ? 'infinite' : seconds(it.cost_s)}`,
     `succeeds ${it.successes} of ${it.episodes}`, `policy: ${it.policy}`, 'in the library, not in the plan'];
 }
@@ -562,8 +563,9 @@ const counts = `${runs.reached} of ${runs.episodes} reached the goal` +
   ['collided', 'timed_out', 'lost'].filter(end => runs[end]).map(end => `, ${runs[end]} ${OUTCOMES[end][0]}`).join('') +
   (drives.length < runs.episodes ? '. Shown: the first 20' + (drives.length > 20 ? ' and those that failed' : '') : '') + '.';
 byId('outcomes').textContent = counts;
+const basis = data.predicted.basis === 'composed' ? 'composed of what the library knows' : `counted on ${data.predicted.episodes} runs`;
 byId('odds').textContent = `Predicted success ${percent(data.predicted.success)} (at least ${percent(data.predicted.lower95)}, ` +
-  `counted on ${data.predicted.episodes} runs), ${data.predicted.sim_time_s.toFixed(1)} s of driving, ` +
+  `${basis}), ${data.predicted.sim_time_s.toFixed(1)} s of driving, ` +
   `${options.length} options between ${data.states.length} states.`;
 
 new ResizeObserver(resize).observe(canvas);

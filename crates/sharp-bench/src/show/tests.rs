@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde_json::Value;
-use sharp_drive::{EpisodeEnd, World};
+use sharp_drive::{EpisodeEnd, SuccessCount, World};
 use sharp_plan::{Answer, Method, Query, Recording, Sharp, Tour};
 use sharp_regions::GeometricDetector;
 use sharp_sim::RobotModel;
@@ -137,6 +137,27 @@ fn where_nothing_fails_the_page_says_so() {
     let data = data(&page(&tour, &[]));
     let words = data["weak"][0]["words"].as_str().expect("words");
     assert_eq!(words, "No leg failed, neither in the runs of the verification nor in 0 drives.");
+}
+
+// Odds that were composed were told as runs of a verification that never was.
+#[test]
+fn composed_odds_are_told_as_such_and_without_counts() {
+    let mut tour = tour();
+    let mut plan = (*tour.plans[0]).clone();
+    plan.solution.composed = Some(plan.solution.odds());
+    plan.solution.steps[0].on_arrival = SuccessCount { episodes: 100, successes: 98 };
+    tour.plans = vec![Arc::new(plan)];
+    let recordings = recorded(&tour, 60.0);
+    let data = data(&page(&tour, &recordings));
+    assert_eq!(
+        (&data["predicted"]["basis"], &data["legs"][0]["basis"]),
+        (&"composed".into(), &"composed".into())
+    );
+    assert_eq!(data["library"], false, "there is none to ask");
+    let weak = data["weak"].as_array().expect("weak places");
+    let words: Vec<&str> = weak.iter().filter_map(|place| place["words"].as_str()).collect();
+    assert!(words.iter().any(|words| words.contains("fails in 2.0 %, composed")), "{words:?}");
+    assert!(words.iter().all(|words| !words.contains("verification")), "{words:?}");
 }
 
 #[test]

@@ -1,13 +1,15 @@
 //! Where a plan is weak, in words and with a place on the map.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 use sharp_drive::{EpisodeEnd, SuccessCount, World};
 use sharp_guide::GuidePath;
-use sharp_plan::{Moment, PlannedOption};
+use sharp_plan::{Moment, Plan, PlannedOption};
 use sharp_space::Point;
 
 use super::PlanPage;
-use super::data::{Legs, centimetres, place};
+use super::data::{Basis, Legs, centimetres, place};
 
 /// Failures of the same leg and kind that are nearer to each other than this count as one place, metres.
 const SAME_PLACE_M: f64 = 1.0;
@@ -49,14 +51,14 @@ pub(super) fn tightest(world: &World, guide: &GuidePath) -> Tight {
 }
 
 /// The weak places of what is shown: where drives failed, the most failures first; other legs that failed in the
-/// verification, the worst first; the tightest place.
+/// verification or are known to fail, the worst first; the tightest place.
 pub(super) fn weak_places(shown: &PlanPage<'_>, legs: &Legs) -> Vec<ShownPlace> {
     let (mut weak, steps) = (failures(shown, legs), steps(shown));
     let mut unseen: Vec<(f64, ShownPlace)> = Vec::new();
-    for (leg, step) in steps.iter().enumerate() {
+    for (leg, &(step, basis)) in steps.iter().enumerate() {
         let SuccessCount { episodes, successes } = step.on_arrival;
         if successes < episodes && weak.iter().all(|place| place.leg != Some(leg)) {
-            let words = format!("{}: {}.", step.option.id, counted(step.on_arrival));
+            let words = format!("{}: {}.", step.option.id, counted(step.on_arrival, basis));
             unseen.push((
                 step.on_arrival.rate(),
                 ShownPlace { words, at: None, leg: Some(leg), failed: false },
@@ -66,19 +68,22 @@ pub(super) fn weak_places(shown: &PlanPage<'_>, legs: &Legs) -> Vec<ShownPlace> 
     unseen.sort_by(|a, b| a.0.total_cmp(&b.0));
     weak.extend(unseen.into_iter().map(|(_, place)| place));
     if weak.is_empty() {
-        let words = format!(
-            "No leg failed, neither in the runs of the verification nor in {} drives.",
-            shown.recordings.len()
-        );
+        let drives = shown.recordings.len();
+        let words = if steps.iter().all(|&(_, basis)| basis == Basis::Runs) {
+            format!("No leg failed, neither in the runs of the verification nor in {drives} drives.")
+        } else {
+            format!("No leg is known to fail, and none failed in {drives} drives.")
+        };
         weak.push(ShownPlace { words, at: None, leg: None, failed: false });
     }
     weak.extend(narrowest(shown, &steps));
     weak
 }
 
-/// The steps of all plans in a row.
-fn steps<'a>(shown: &PlanPage<'a>) -> Vec<&'a PlannedOption> {
-    shown.tour.plans.iter().flat_map(|plan| &plan.solution.steps).collect()
+/// The steps of all plans in a row, each with where its count is from.
+fn steps<'a>(shown: &PlanPage<'a>) -> Vec<(&'a PlannedOption, Basis)> {
+    let of_plan = |plan: &'a Arc<Plan>| plan.solution.steps.iter().map(move |step| (step, Basis::of(plan)));
+    shown.tour.plans.iter().flat_map(of_plan).collect()
 }
 
 /// Failed drives of one leg that ended near each other in the same way.
@@ -130,32 +135,34 @@ fn described(Failures { leg, end, places }: &Failures, is_first: bool, shown: &P
     let drives = format!("{} of {} drives {what} near ({x}, {y})", places.len(), shown.recordings.len());
     let step = leg.map(|leg| steps(shown)[leg]);
     let words = match step {
-        Some(step) if is_first => format!("{}: {drives}; {}.", step.option.id, counted(step.on_arrival)),
-        Some(step) => format!("{}: {drives}.", step.option.id),
+        Some((step, basis)) if is_first => {
+            format!("{}: {drives}; {}.", step.option.id, counted(step.on_arrival, basis))
+        }
+        Some((step, _)) => format!("{}: {drives}.", step.option.id),
         None => format!("{drives}, on a way that was planned anew."),
     };
     ShownPlace { words, at: Some([x, y]), leg: *leg, failed: true }
 }
 
-/// What the verification counted of a leg.
-fn counted(count: SuccessCount) -> String {
+/// How often a leg fails that came to `count`.
+fn counted(count: SuccessCount, basis: Basis) -> String {
     let SuccessCount { episodes, successes } = count;
-    let failed = episodes - successes;
-    format!(
-        "failed in {failed} of {episodes} runs of the verification ({:.1} %)",
-        100.0 * (1.0 - count.rate())
-    )
+    let (failed, share) = (episodes - successes, 100.0 * (1.0 - count.rate()));
+    match basis {
+        Basis::Runs => format!("failed in {failed} of {episodes} runs of the verification ({share:.1} %)"),
+        Basis::Composed => format!("fails in {share:.1} %, composed of what the library knows"),
+    }
 }
 
 /// The tightest place of all legs.
-fn narrowest(shown: &PlanPage<'_>, steps: &[&PlannedOption]) -> Option<ShownPlace> {
+fn narrowest(shown: &PlanPage<'_>, steps: &[(&PlannedOption, Basis)]) -> Option<ShownPlace> {
     let world = &shown.tour.plans[0].world;
-    let places = steps.iter().enumerate().map(|(leg, step)| (leg, tightest(world, &step.option.guide)));
+    let places = steps.iter().enumerate().map(|(leg, (step, _))| (leg, tightest(world, &step.option.guide)));
     let (leg, tight) = places.min_by(|a, b| a.1.beside_m.total_cmp(&b.1.beside_m))?;
     let ([x, y], beside_m) = (tight.at, tight.beside_m);
     let words = format!(
         "Tightest place: {} at ({x}, {y}), {beside_m:.2} m between the robot's sides and the nearest wall.",
-        steps[leg].option.id
+        steps[leg].0.option.id
     );
     Some(ShownPlace { words, at: Some(tight.at), leg: Some(leg), failed: false })
 }

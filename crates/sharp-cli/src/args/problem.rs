@@ -16,10 +16,10 @@ pub(crate) struct ProblemArgs {
     pub(crate) goal: Option<String>,
     /// Start in the middle of a pixel of the map's picture: column and row from the upper left, from 0, and radians in
     /// the map's frame [default heading: towards the goal].
-    #[arg(long, value_name = "C,R[,YAW]", conflicts_with = "start")]
+    #[arg(long, value_name = "C,R[,YAW]", conflicts_with = "start", allow_hyphen_values = true)]
     pub(crate) start_pixel: Option<String>,
     /// Goal in the middle of a pixel.
-    #[arg(long, value_name = "C,R", conflicts_with = "goal")]
+    #[arg(long, value_name = "C,R", conflicts_with = "goal", allow_hyphen_values = true)]
     pub(crate) goal_pixel: Option<String>,
     /// One of a named map's own problems, or of --scen, instead of start and goal.
     #[arg(long, value_name = "N", conflicts_with_all = ["start", "goal", "start_pixel", "goal_pixel"])]

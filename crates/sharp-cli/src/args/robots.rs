@@ -26,7 +26,7 @@ pub(crate) enum Robots {
         #[arg(long)]
         name: Option<String>,
         /// Its top speed, metres per second [default: the controller's].
-        #[arg(long, value_name = "M/S")]
+        #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
         max_speed: Option<f64>,
         /// How it steers [default: what the files say].
         #[arg(long, value_enum)]

@@ -1,9 +1,9 @@
 //! What `sharp eval` and `sharp jobs` may be asked.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
-use sharp_bench::{Suite, SuiteSelection};
+use sharp_bench::{Suite, SuiteSelection, shell_word};
 
 use super::{Kind, Learning, Switch};
 
@@ -79,7 +79,7 @@ pub(crate) struct SuiteArgs {
     #[arg(long, value_enum, default_value_t = Switch::On)]
     pub(crate) cost_update: Switch,
     /// Wall time of solving one problem, or of one baseline on it, seconds.
-    #[arg(long, value_name = "S", default_value_t = 2400.0)]
+    #[arg(long, value_name = "S", default_value_t = 2400.0, allow_negative_numbers = true)]
     pub(crate) time_limit: f64,
 }
 
@@ -193,14 +193,15 @@ impl SuiteArgs {
         selection
     }
 
-    /// The call of `sharp SUBCOMMAND` that asks for the same jobs.
-    pub(crate) fn command(&self, subcommand: &str, seed: u64) -> String {
+    /// The call of `sharp SUBCOMMAND` that asks for the same jobs in the folder `out`.
+    pub(crate) fn command(&self, subcommand: &str, seed: u64, out: &Path) -> String {
         let Self { suite, episodes, regions, time_limit, .. } = self;
         let mut text = format!(
-            "sharp --seed {seed} {subcommand} {} --episodes {episodes} --noise {} --regions {regions} \
+            "sharp --seed {seed} {subcommand} {} --episodes {episodes} --noise {} --regions {} \
              --recovery {} --cost-update {} --time-limit {time_limit}",
             word(suite),
-            self.noise.join(","),
+            shell_word(&self.noise.join(",")),
+            shell_word(regions),
             word(&self.recovery),
             word(&self.cost_update),
         );
@@ -219,7 +220,7 @@ impl SuiteArgs {
                 text += &format!(" --{flag} {value}");
             }
         }
-        text
+        text + &format!(" --out {}", shell_word(&out.display().to_string()))
     }
 }
 
@@ -252,7 +253,13 @@ mod tests {
                     --cost-update on --time-limit 60 --learning fast,paper --envs a,b --options interface \
                     --problems 1,3 --methods sharp,rrt-contact --trials 2";
         let (args, seed) = parse(text);
-        assert_eq!(args.command("eval", seed), text);
+        assert_eq!(args.command("eval", seed, Path::new("out/e")), format!("{text} --out out/e"));
+        let (args, seed) = parse("sharp eval quick --noise nominal*2");
+        let command = args.command("eval", seed, Path::new("my out"));
+        assert!(
+            command.contains(" --noise 'nominal*2' ") && command.ends_with(" --out 'my out'"),
+            "{command}"
+        );
     }
 
     #[test]

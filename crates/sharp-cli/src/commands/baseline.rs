@@ -38,6 +38,9 @@ pub(crate) fn run(args: &Baseline, seed: u64, json: bool) -> Result<Exit, Failur
     let report = measure(&problem, &settings, stopwatch, &monitor)?;
     bar.finish_and_clear();
     warn_of_curves(monitor.0);
+    if report.status == "timeout" && !is_interrupted() {
+        eprintln!("warning: time was up after {} of {} executions", report.episodes, args.episodes);
+    }
     if json {
         say!("{}", to_json(&report));
     } else {

@@ -17,7 +17,7 @@ use crate::progress::{bar, is_interrupted};
 
 pub(crate) fn run(args: &Eval, seed: u64, json: bool) -> Result<Exit, Failure> {
     let extra = args.baselines.as_deref().map(read_baselines).transpose()?.unwrap_or_default();
-    let command = args.selection.command("eval", seed) + &format!(" --out {}", args.out.display());
+    let command = args.selection.command("eval", seed, &args.out);
     let experiments = args.selection.request(seed).experiments()?;
     let (manifest, indices) = Manifest::extend(&args.out, experiments, &command)?;
     let engine: Box<dyn Engine> = match args.engine {

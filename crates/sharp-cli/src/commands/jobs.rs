@@ -23,7 +23,7 @@ pub(crate) fn run(jobs: &Jobs, seed: u64, json: bool) -> Result<Exit, Failure> {
 }
 
 fn plan(selection: &SuiteArgs, out: &Path, seed: u64) -> Result<Exit, Failure> {
-    let command = selection.command("jobs plan", seed) + &format!(" --out {}", out.display());
+    let command = selection.command("jobs plan", seed, out);
     let (manifest, indices) = Manifest::extend(out, selection.request(seed).experiments()?, &command)?;
     let weight_s: f64 = indices.iter().map(|&index| manifest.jobs[index].weight_s).sum();
     say!(

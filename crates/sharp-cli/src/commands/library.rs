@@ -36,7 +36,7 @@ pub(crate) fn run(command: &Library, json: bool) -> Result<Exit, Failure> {
         say!("{} options, every file sound", options.len());
     } else {
         for Entry { world, option, episodes, successes, cost_s } in &options {
-            let cost = cost_s.map_or("no time".to_owned(), |cost_s| format!("{cost_s:.1} s"));
+            let cost = cost_s.map_or("never succeeded".to_owned(), |cost_s| format!("cost {cost_s:.1} s"));
             say!("{world}  {option:<14} holds {successes}/{episodes}, {cost}");
         }
     }
@@ -49,12 +49,12 @@ fn entries(dir: &Path, is_check: bool) -> Result<Vec<Entry>, Failure> {
     let mut worlds: Vec<String> = std::fs::read_dir(dir)
         .map_err(unreadable)?
         .filter_map(Result::ok)
-        .filter(|entry| entry.path().is_dir() && holds_ron(&entry.path()))
+        .filter(|entry| is_world(&entry.path()))
         .filter_map(|entry| entry.file_name().into_string().ok())
         .collect();
     worlds.sort();
-    if is_check && worlds.is_empty() {
-        let whole = if holds_ron(dir) { "; the folder above it may be one" } else { "" };
+    if worlds.is_empty() {
+        let whole = if is_world(dir) { "; the folder above it may be one" } else { "" };
         let message = format!("{} is no library: no folder in it holds options{whole}", dir.display());
         return Err(Failure::new("FILE_UNREADABLE", message));
     }
@@ -76,7 +76,16 @@ fn entries(dir: &Path, is_check: bool) -> Result<Vec<Entry>, Failure> {
     Ok(entries)
 }
 
-fn holds_ron(folder: &Path) -> bool {
+/// Returns true if `folder` holds what a library keeps of one world: options, options that are being saved, abstractions or
+/// buildings. The files of a plan have other names.
+fn is_world(folder: &Path) -> bool {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    files.map(|file| file.path()).any(|file| file.extension().is_some_and(|ending| ending == "ron"))
+    files.filter_map(|file| file.file_name().into_string().ok()).any(|name| {
+        // As in c_20-19: the family of the option, and its states.
+        let mut bytes = name.bytes();
+        let is_option =
+            bytes.next().is_some_and(|family| family.is_ascii_lowercase()) && bytes.next() == Some(b'_');
+        let is_other = ["saving-", "abstraction-", "building-"].iter().any(|kind| name.starts_with(kind));
+        name.ends_with(".ron") && (is_option || is_other)
+    })
 }

@@ -1,14 +1,15 @@
 //! `sharp map info|check|save`: what a map file says, whether a robot has room in it, and the same as a ROS map.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use sharp_bench::{MapReport, named};
+use sharp_draw::numbers::plain;
 use sharp_plan::AbstractionSettings;
 use sharp_rbvd::Rbvd;
 use sharp_space::Occupancy;
 
-use crate::args::Map;
+use crate::args::{Map, MapArgs};
 use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 
@@ -43,13 +44,20 @@ struct Saved {
     file: String,
 }
 
-/// A map is a YAML file, and its image must not take the place of one that no such file owns.
-fn check_target(out: &Path) -> Result<(), Failure> {
+/// A map is a YAML file. Neither it nor its image may take the place of what is read for `map`, or of an image that no such
+/// file owns.
+fn check_target(map: &MapArgs, out: &Path) -> Result<(), Failure> {
     let refused = |problem: String| Failure::new("USAGE", format!("--out is {}, {problem}", out.display()));
-    if out.extension().is_some_and(|ending| ending != "yaml" && ending != "yml") {
+    if out.extension().is_none_or(|ending| ending != "yaml" && ending != "yml") {
         return Err(refused("expected a name that ends in .yaml".to_owned()));
     }
     let image = out.with_extension("pgm");
+    let read: Vec<PathBuf> =
+        std::iter::once(&map.map).chain(&map.reading.keepout).map(PathBuf::from).collect();
+    let images: Vec<PathBuf> = read.iter().filter_map(|file| sharp_maps::image_of(file)).collect();
+    for target in [out, &image] {
+        input::check_not_input(target, read.iter().chain(&images).map(PathBuf::as_path))?;
+    }
     if image.exists() && !out.exists() {
         return Err(refused(format!("which would overwrite {}: choose another name", image.display())));
     }
@@ -84,7 +92,7 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
                     info.map.name,
                     info.width,
                     info.height,
-                    info.map.resolution_m,
+                    plain(info.map.resolution_m),
                     info.map.width_m,
                     info.map.height_m,
                     info.origin[0],
@@ -104,8 +112,12 @@ pub(crate) fn run(command: &Map, json: bool) -> Result<Exit, Failure> {
             Ok(Exit::Done)
         }
         Map::Save { map, out } => {
+            check_target(map, out)?;
             let map = input::map(map)?;
-            check_target(out)?;
+            let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+            folder
+                .map_or(Ok(()), std::fs::create_dir_all)
+                .map_err(|source| sharp_maps::MapError::Write { file: out.display().to_string(), source })?;
             sharp_maps::save_ros(&map.grid, out)?;
             let (frame, file) = (map.grid.frame(), out.display().to_string());
             if json {

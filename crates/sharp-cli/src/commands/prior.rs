@@ -17,7 +17,7 @@ use sharp_space::Seed;
 
 use crate::args::{Preset, PriorCommand, PriorCost, PriorScore, PriorTrain};
 use crate::outcome::{Exit, Failure, say, to_json};
-use crate::progress;
+use crate::{input, progress};
 
 /// How often what was learnt is saved, so that a crash costs little.
 const SAVE_EVERY: Duration = Duration::from_secs(60);
@@ -79,6 +79,7 @@ pub(crate) fn run(command: &PriorCommand, seed: u64, json: bool) -> Result<Exit,
 
 fn run_train(args: &PriorTrain, seed: u64, json: bool) -> Result<Exit, Failure> {
     let begun = Instant::now();
+    input::check_out_file("--out", &args.out)?;
     let robot = named::robot(&args.robot)?;
     let recipe = PriorRecipe::by_name(args.preset.name()).expect("every word names a recipe");
     let saved = read(&checkpoint(args))?;
@@ -206,6 +207,7 @@ fn prior_of(file: Option<&Path>, robot: &RobotModel) -> Result<Prior, Failure> {
 
 fn run_cost(args: &PriorCost, seed: u64, json: bool) -> Result<Exit, Failure> {
     let begun = Instant::now();
+    input::check_out_file("--out", &args.out)?;
     let robot = named::robot(&args.robot)?;
     let prior = prior_of(args.from.as_deref(), &robot)?;
     let recipe = match args.preset {

@@ -48,6 +48,8 @@ fn predict(args: &Abstract, json: bool) -> Result<Exit, Failure> {
     let world = named::world(&map, named::robot(&args.abstraction.robot)?);
     let detector = named::detector(&world, &args.abstraction.regions)?;
     let found = detector.detect(&world.grid, &world.robot.footprint);
+    // A list of places has no picture of its own.
+    pictures::forget(&args.out.join("regions"));
     if let Some(criticality) = &found.criticality {
         let picture = pictures::regions(&world.grid, criticality, &found.regions);
         pictures::write(&args.out, "regions", &picture)?;

@@ -230,14 +230,15 @@ fn at_doors(
     let doors: Vec<Point> = load_doors(doors)?.iter().map(sharp_maps::Door::middle).collect();
     let score = score_doors(&regions, world.geometry.clearance(), &world.robot.footprint, &doors);
     let (robot, map) = (world.robot.name.clone(), loaded.name);
-    let report = DoorReport { schema: "sharp.regions.score/1", robot, map, source, score };
+    let report = DoorReport { schema: "sharp.regions.doors/1", robot, map, source, score };
     if json {
         say!("{}", to_json(&report));
     } else {
         let DoorScore { doors, found, found_by_centers, regions, false_regions, false_per_door, .. } = score;
+        let share = if found > 0 { format!(", {false_per_door:.2} a door found") } else { String::new() };
         say!(
             "{found} of {doors} doors have a region within a metre ({found_by_centers} its centre); of {regions} regions \
-             {false_regions} are at no door, junction or narrowing, {false_per_door:.2} a door found"
+             {false_regions} are at no door, junction or narrowing{share}"
         );
     }
     Ok(Exit::Done)

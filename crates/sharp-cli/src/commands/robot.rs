@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use serde::Serialize;
 use sharp_bench::{ImportWishes, ImportedField, import_robot, named};
 use sharp_plan::write_atomic;
-use sharp_sim::RobotModel;
+use sharp_sim::{RobotError, RobotModel};
 use sharp_space::FootprintShape;
 
 use crate::args::{DriveName, Robots};
+use crate::input;
 use crate::outcome::{Exit, Failure, say, to_json};
 
 #[derive(Serialize)]
@@ -122,7 +123,26 @@ fn show(name: &str, json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Refuses a flag that no robot could have, before the files are blamed for it.
+fn check(wishes: &ImportWishes) -> Result<(), Failure> {
+    let name = wishes.name.as_deref().unwrap_or("robot");
+    let speed_mps = wishes.max_speed_mps.unwrap_or(1.0);
+    let text =
+        format!("(name: {name:?}, robot_radius: 0.3, drive: Differential(), max_speed_mps: {speed_mps:?})");
+    match RobotModel::from_ron(&text) {
+        Ok(_) => Ok(()),
+        Err(RobotError::Value { value, expected, .. }) => {
+            Err(Failure::new("USAGE", format!("--max-speed is {value:?}, must be {expected}")))
+        }
+        Err(error) => Err(Failure::new("USAGE", format!("--name: {error}"))),
+    }
+}
+
 fn import(files: &[PathBuf], out: Option<PathBuf>, wishes: &ImportWishes, json: bool) -> Result<(), Failure> {
+    check(wishes)?;
+    if let Some(out) = &out {
+        input::check_not_input(out, files.iter().map(PathBuf::as_path))?;
+    }
     let imported = import_robot(files, wishes)?;
     let robot = &imported.robot;
     let out = out.map_or_else(|| fresh_file(&robot.name), Ok)?;

@@ -32,20 +32,19 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
             format!("--record: the plan has {count} goals in a row, expected one; record each goal-N");
         return Err(Failure::new("USAGE", message));
     }
+    if let Some(file) = &args.record {
+        input::check_out_file("--record", file)?;
+    }
+    match &args.show {
+        Some(Some(file)) => input::check_out_file("--show", file)?,
+        Some(None) => input::check_out("--show", &args.plan_dir)?,
+        None => {}
+    }
     let spinner = progress::spinner("driving");
     let is_kept = args.record.is_some() || args.show.is_some();
     let recordings = if is_kept { tour.record(&settings, &clock_us()) } else { vec![] };
-    if let Some(file) = &args.record {
-        write_atomic(file, &driven_mcap(&tour.plans[0], &recordings)?)?;
-    }
-    if let Some(file) = &args.show {
-        let map = map_name(&args.plan_dir);
-        let shown = PlanPage { map: &map, tour: &tour, recordings: &recordings, library: None };
-        let path = show::write(&shown, &args.plan_dir, file.as_deref())?;
-        eprintln!("page written to {}", path.display());
-    }
     let episodes: Vec<Execution> = if is_kept {
-        recordings.into_iter().map(|recording| recording.execution).collect()
+        recordings.iter().map(|recording| recording.execution.clone()).collect()
     } else {
         tour.run(&settings, &clock_us())
     };
@@ -79,6 +78,16 @@ pub(crate) fn run(args: &Run, seed: u64, json: bool) -> Result<Exit, Failure> {
         if has_picture {
             say!("picture: {}", args.plan_dir.join("run.png").display());
         }
+    }
+    // What was driven has been reported by now, whether or not it can be written.
+    if let Some(file) = &args.record {
+        write_atomic(file, &driven_mcap(&tour.plans[0], &recordings)?)?;
+    }
+    if let Some(file) = &args.show {
+        let map = map_name(&args.plan_dir);
+        let shown = PlanPage { map: &map, tour: &tour, recordings: &recordings, library: None };
+        let path = show::write(&shown, &args.plan_dir, file.as_deref())?;
+        eprintln!("page written to {}", path.display());
     }
     Ok(Exit::Done)
 }

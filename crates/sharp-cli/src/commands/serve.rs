@@ -4,8 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 use sharp_bench::parse_pose_line;
-use sharp_plan::{Instruction, Plan, RemoteDriver};
-use sharp_space::{Occupancy, Pose};
+use sharp_plan::{Instruction, RemoteDriver, is_placed};
 
 use crate::args::Serve;
 use crate::commands::run::load_tour;
@@ -32,11 +31,11 @@ pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
         return Err(Failure::new("USAGE", message.to_owned()));
     }
     let tour = load_tour(folder)?;
-    let plan = &tour.plans[0];
+    let world = &tour.plans[0].world;
     let mut driver: Option<RemoteDriver> = None;
     answer_lines(|line, number| {
         Ok(vec![match line.and_then(|line| parse_pose_line(&line)) {
-            Ok(reading) if is_placed(plan, &reading.pose) => {
+            Ok(reading) if is_placed(world, &reading.pose) => {
                 let begin = || RemoteDriver::new(tour.plans.clone(), &reading, true);
                 reply(&driver.get_or_insert_with(begin).answer(&reading))
             }
@@ -45,12 +44,6 @@ pub(crate) fn run(args: &Serve) -> Result<Exit, Failure> {
             Err(problem) => Failure::new("POSE_INVALID", format!("line {number}: {problem}")).to_json(),
         }])
     })
-}
-
-/// Returns true if a robot can be at `pose`: its middle is in the free space of the map.
-fn is_placed(plan: &Plan, pose: &Pose) -> bool {
-    let grid = &plan.world.grid;
-    grid.frame().cell_at(pose.position).is_some_and(|cell| grid.get(cell) == Occupancy::Free)
 }
 
 fn reply(instruction: &Instruction) -> String {

@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
     let query = input::query(&map, &args.problem)?;
     let mut problem = NamedProblem::new(&map, query, &args.abstraction.robot, &args.noise)?;
     if let Some(limits) =
-        input::speed_limits(&args.speed, &args.map.reading, problem.world.robot.max_speed_mps)?
+        input::speed_limits(&args.speed, &args.map.reading, &map, problem.world.robot.max_speed_mps)?
     {
         problem.world = problem.world.with_speed_limits(limits);
     }
@@ -54,8 +54,8 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
         seed,
     };
     args.out.as_deref().map_or(Ok(()), |folder| input::check_out("--out", folder))?;
-    if let Some(folder) = args.show.iter().flatten().filter_map(|file| file.parent()).next() {
-        input::check_out("--show", folder)?;
+    if let Some(Some(file)) = &args.show {
+        input::check_out_file("--show", file)?;
     }
     let library = input::library(args.library.as_deref());
     let trainings = args.out.as_deref().filter(|_| library.is_none()).map(|folder| folder.join(TRAININGS));
@@ -95,7 +95,7 @@ pub(crate) fn run(args: &Solve, seed: u64, json: bool) -> Result<Exit, Failure> 
             solved.write(&folder, &folder)?;
         }
         if let (Some(tour), Some(folder)) = (&solved.tour, &solved.report.plan_dir) {
-            shown(args, (tour, &problem.map), None, (seed, Path::new(folder)))?;
+            shown(args, (tour, &problem.map), solved.library(), (seed, Path::new(folder)))?;
         }
         (solved.report, is_time_up)
     };

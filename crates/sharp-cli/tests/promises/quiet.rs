@@ -57,7 +57,7 @@ fn commands_write_below_their_output_folders_and_open_no_socket() {
         (&["run", "plan", "--episodes", "2", "--show", "page.html"], &["page.html", "plan"]),
         (&["export", "plan", "--format", "csv", "--out", "path.csv"], &["path.csv"]),
         (&["export", "plan", "--format", "geojson", "--out", "path.geojson"], &["path.geojson"]),
-        (&["map", "save", "rooms.yaml", "--out", "saved"], &["saved", "saved.yaml", "saved.pgm"]),
+        (&["map", "save", "rooms.yaml", "--out", "saved.yaml"], &["saved.yaml", "saved.pgm"]),
         (&["map", "info", "rooms.yaml"], &[]),
         (&["library", "check", "lib"], &[]),
         (&["jobs", "plan", "smoke", "--out", "jobs"], &["jobs"]),

@@ -203,7 +203,7 @@ fn a_folder_that_cannot_be_written_is_named_and_read_all_the_same() {
             "disk/other",
         ),
         ("pictures", vec!["abstract", "rooms.yaml", "--out", "disk/abstract"], 2, "disk/abstract"),
-        ("a map", vec!["map", "save", "rooms.yaml", "--out", "disk/map"], 2, "disk/map"),
+        ("a map", vec!["map", "save", "rooms.yaml", "--out", "disk/map.yaml"], 2, "disk/map"),
         ("a recording", vec!["run", "plan", "--episodes", "1", "--record", "disk/a.mcap"], 2, "disk/a.mcap"),
         ("an export", vec!["export", "plan", "--format", "csv", "--out", "disk/a.csv"], 2, "disk/a.csv"),
         ("jobs", vec!["jobs", "plan", "smoke", "--out", "disk/jobs"], 2, "disk/jobs"),

@@ -38,8 +38,8 @@ struct DoorEntry {
 /// Reads the doors in the file at `path`.
 ///
 /// # Errors
-/// Returns an error if the file cannot be read, is no list of doors, or has a corner that is not
-/// finite.
+/// Returns an error if the file cannot be read, is no list of doors or an empty one, or has a corner
+/// that is not finite.
 pub fn load_doors(path: &Path) -> Result<Vec<Door>, MapError> {
     let file = path.display().to_string();
     let bytes = files::read(path, FileKind::Text)?;
@@ -51,6 +51,9 @@ fn parse(file: &str, text: &str) -> Result<Vec<Door>, MapError> {
         let reason = error.without_snippet().to_string().replace('\n', " ");
         MapError::syntax(file, format!("is no list of doors: {reason}"))
     })?;
+    if entries.is_empty() {
+        return Err(MapError::syntax(file, "lists no door"));
+    }
     entries.into_iter().map(|entry| door(file, entry)).collect()
 }
 
@@ -81,6 +84,7 @@ mod tests {
         let infinite = ONE.replace("[3, 2.0]", "[.inf, 2.0]");
         for (text, expected) in [
             ("name: d1", "is no list of doors"),
+            ("[]", "lists no door"),
             ("- name: d1\n  door_corner_pt_1: [1.0, 2]", "door_corner_pt_2"),
             (&ONE.replace("[3, 2.0]", "[3]"), "is no list of doors"),
             (&infinite, "door \"d1\" is inf"),

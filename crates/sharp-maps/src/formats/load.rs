@@ -91,14 +91,14 @@ fn load_file(spec: &str, options: &LoadOptions) -> Result<MapFile, MapError> {
     let mut warnings = Vec::new();
     let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let grid = match ending.as_str() {
-        "yaml" | "yml" => ros::load(path, options, &mut warnings)?,
+        ending if ros::is_ending(ending) => ros::load(path, options, &mut warnings)?,
         "ron" => {
             let bytes = files::read(path, FileKind::Text)?;
             floor_plan::parse(spec, files::as_text(spec, &bytes)?)?
         }
         _ => load_cells(spec, &ending, options, &mut warnings)?,
     };
-    if matches!(ending.as_str(), "yaml" | "yml" | "ron") && options.resolution_m.is_some() {
+    if (ros::is_ending(&ending) || ending == "ron") && options.resolution_m.is_some() {
         warnings.push(format!("{spec}: states its own resolution, the given one is not used"));
     }
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();

@@ -23,6 +23,7 @@ pub use doors::{Door, load_doors};
 pub use error::MapError;
 pub use load::{LoadOptions, MapFile, Problem, load};
 pub use named::named_maps;
+pub use ros::image_of;
 pub use save::save_ros;
 pub use scenario::{MovingAiProblem, load_scenario};
 pub use value_mask::{ValueMask, load_values};

@@ -108,7 +108,12 @@ fn decode_pnm(file: &str, bytes: &[u8], warning: &mut Option<String>) -> Result<
     if is_ascii && rest.iter().all(u8::is_ascii_whitespace) || rest.is_empty() {
         return Ok(image);
     }
-    let first_pixel = bytes.len().saturating_sub(rest.len() + image.as_bytes().len());
+    // A bitmap packs eight pixels of a row into a byte.
+    let pixel_bytes = match bytes[1] {
+        b'4' => image.height() as usize * (image.width() as usize).div_ceil(8),
+        _ => image.as_bytes().len(),
+    };
+    let first_pixel = bytes.len().saturating_sub(rest.len() + pixel_bytes);
     let ends_in_cr_lf = first_pixel > 0 && bytes[first_pixel - 1..].starts_with(b"\r\n");
     if ends_in_cr_lf {
         return Err(MapError::image(file, "its header ends in CR LF, must end in a single white space"));

@@ -9,6 +9,8 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_saphyr::Error;
+use serde_saphyr::budget::BudgetBreach;
 use serde_saphyr::options::{DuplicateKeyPolicy, MergeKeyPolicy, NonFiniteFloatPolicy};
 use sharp_space::{GridFrame, Occupancy, OccupancyGrid, Pose};
 
@@ -94,6 +96,11 @@ struct RosDescription {
     unread: Vec<String>,
 }
 
+/// Returns true if files that end so are ROS maps.
+pub(crate) fn is_ending(ending: &str) -> bool {
+    ["yaml", "yml"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
 /// Reads the map described by the YAML file at `path`.
 pub(crate) fn load(
     path: &Path,
@@ -115,6 +122,11 @@ pub(crate) fn values(
 ) -> Result<(GridFrame, Vec<i8>), MapError> {
     let file = path.display().to_string();
     let (description, picture) = read(path, options, warnings)?;
+    if description.rules.mode == GreyMode::Trinary {
+        warnings.push(format!(
+            "{file}: is of mode trinary, whose values are 0 and 100 only; the modes scale and raw have those in between"
+        ));
+    }
     // What is a sound grid has a sound frame.
     let frame = *to_grid(&file, &picture, &description)?.frame();
     let GreyImage { width, grey, transparent, .. } = &picture;
@@ -157,8 +169,9 @@ fn read(
     Ok((description, picture))
 }
 
-/// The image that the YAML file at `path` names, if it is a sound description of a map.
-pub(crate) fn image_of(path: &Path) -> Option<PathBuf> {
+/// The image that the ROS map at `path` (YAML) names; `None` if that is no sound description of a map.
+#[must_use]
+pub fn image_of(path: &Path) -> Option<PathBuf> {
     let file = path.display().to_string();
     let bytes = files::read(path, FileKind::Text).ok()?;
     let description = describe(&file, files::as_text(&file, &bytes).ok()?).ok()?;
@@ -262,7 +275,8 @@ fn describe(file: &str, text: &str) -> Result<RosDescription, MapError> {
     }
     let resolution_m = fields.number("resolution", "metres a pixel, from 1e-6 to 1000")?;
     if !(1e-6..=1000.0).contains(&resolution_m) {
-        return Err(MapError::field(file, "resolution", resolution_m, "metres a pixel, from 1e-6 to 1000"));
+        let found = number_text(resolution_m);
+        return Err(MapError::field(file, "resolution", found, "metres a pixel, from 1e-6 to 1000"));
     }
     let rules = GreyRules {
         mode: fields.mode()?,
@@ -365,8 +379,11 @@ fn parse_yaml(file: &str, text: &str) -> Result<Vec<(String, YamlValue)>, MapErr
         non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
     };
     let node: YamlValue = serde_saphyr::from_str_with_options(text, options).map_err(|error| {
-        let reason = error.without_snippet().to_string();
-        MapError::syntax(file, format!("is no valid YAML: {}", reason.replace('\n', " ")))
+        let error = error.without_snippet();
+        if matches!(error, Error::Budget { breach: BudgetBreach::Documents { .. }, .. }) {
+            return MapError::syntax(file, "holds several YAML documents, a ROS map is one");
+        }
+        MapError::syntax(file, format!("is no valid YAML: {}", error.to_string().replace('\n', " ")))
     })?;
     match node {
         YamlValue::Entries(entries) => Ok(entries),
@@ -402,7 +419,7 @@ impl YamlValue {
             Self::Null => "empty".to_owned(),
             Self::Bool(value) => value.to_string(),
             Self::Int(value) => value.to_string(),
-            Self::Float(value) => value.to_string(),
+            Self::Float(value) => number_text(*value),
             Self::Text(text) => format!("{:?}", text.chars().take(60).collect::<String>()),
             Self::List(list) if list.len() <= 8 => {
                 format!("[{}]", list.iter().map(Self::describe).collect::<Vec<_>>().join(", "))
@@ -411,6 +428,13 @@ impl YamlValue {
             Self::Entries(_) => "a mapping".to_owned(),
         }
     }
+}
+
+/// A number for messages: those that would fill a line with digits have an exponent.
+fn number_text(value: f64) -> String {
+    let size = value.abs();
+    let is_long = size.is_finite() && size != 0.0 && !(1e-15..1e15).contains(&size);
+    if is_long { format!("{value:e}") } else { value.to_string() }
 }
 
 impl<'de> Deserialize<'de> for YamlValue {

@@ -16,8 +16,8 @@ use super::ros::{FREE_THRESHOLD, OCCUPIED_THRESHOLD};
 /// names it.
 ///
 /// # Errors
-/// Returns an error if `path` has no plain file name that YAML can hold or the files cannot be
-/// written.
+/// Returns an error if `path` has no plain file name that YAML can hold, does not end as ROS maps
+/// do (`.yaml` or `.yml`), which is how a reader knows one, or the files cannot be written.
 pub fn save_ros(grid: &OccupancyGrid, path: &Path) -> Result<(), MapError> {
     let file = path.display().to_string();
     let stem = path.file_stem().and_then(|stem| stem.to_str());
@@ -25,10 +25,12 @@ pub fn save_ros(grid: &OccupancyGrid, path: &Path) -> Result<(), MapError> {
         let expected = "a path that ends in a printable file name";
         MapError::field(&file, "path", format!("{file:?}"), expected)
     })?;
-    let image = path.with_file_name(format!("{stem}.pgm"));
-    if image == path {
-        return Err(MapError::field(&file, "ending", "\"pgm\"", ".yaml, as the image takes .pgm"));
+    let ending = path.extension().map(|ending| ending.to_string_lossy());
+    if !ending.as_deref().is_some_and(super::ros::is_ending) {
+        let found = ending.map_or("missing".to_owned(), |ending| format!("{ending:?}"));
+        return Err(MapError::field(&file, "ending", found, ".yaml or .yml"));
     }
+    let image = path.with_file_name(format!("{stem}.pgm"));
     let yaml = yaml(grid, &format!("{stem}.pgm"));
     replace(&image, &pgm(grid))?;
     replace(path, yaml.as_bytes())

@@ -65,6 +65,11 @@ pub trait OptionLearner: Debug + Send + Sync {
         None
     }
 
+    /// Whether a follower may take the place of what is [`at_hand`](Self::at_hand) where that does poorly.
+    fn has_stand_in(&self) -> bool {
+        false
+    }
+
     /// Success below which [`improve`](Self::improve) wants to train, share of episodes.
     fn train_below(&self) -> f64 {
         0.0

@@ -118,6 +118,10 @@ impl OptionLearner for Selection {
         Some(prior(task))
     }
 
+    fn has_stand_in(&self) -> bool {
+        true
+    }
+
     fn train_below(&self) -> f64 {
         self.train_below
     }

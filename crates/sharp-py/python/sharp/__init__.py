@@ -234,7 +234,7 @@ class Driver:
         self._core = core
 
     def act(self, pose: Sequence[float], speed: float | None = None, yaw_rate: float | None = None) -> Waypoint:
-        """The waypoint for a robot at `pose`; to be asked every half second."""
+        """The waypoint for a robot at `pose`; to be asked every half second. Off the map or in an obstacle it is lost."""
         return Waypoint(*self._core.act(_pose("pose", pose, True), speed, yaw_rate))
 
 

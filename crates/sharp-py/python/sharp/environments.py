@@ -11,6 +11,7 @@ whether the end was reached. The reward is "progress" along the guide, or the "p
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import gymnasium
@@ -55,6 +56,8 @@ class _Env(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begins an episode; with a seed, the episodes from here on repeat those after the same seed."""
+        # Gymnasium takes Python's whole numbers only.
+        seed = None if seed is None else operator.index(seed)
         super().reset(seed=seed)
         # Without any seed a fresh environment is random, as Gymnasium's are.
         if seed is None and self._seed is None:
@@ -147,12 +150,16 @@ class VectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begins an episode in each slot; one seed stands for itself and those after it."""
+        if isinstance(seed, np.integer):
+            seed = operator.index(seed)
         super().reset(seed=seed if isinstance(seed, int) else None)
         if seed is None and not self._is_seeded:
             seed = int(self.np_random.integers(2**62))
         if isinstance(seed, int):
             seed = [seed + slot for slot in range(self.num_envs)]
         seeds = seed if seed is not None else [None] * self.num_envs
+        if len(seeds) != self.num_envs:
+            raise SharpError("USAGE", f"seed has {len(seeds)} numbers, expected one, or one for each of {self.num_envs} slots")
         self._is_seeded = True
         self._is_over[:] = 0
         rows = [self._core.reset(slot, number) for slot, number in enumerate(seeds)]

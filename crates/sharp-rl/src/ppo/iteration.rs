@@ -194,6 +194,7 @@ impl<'a, B: BatchEnvironment> PpoRun<'a, B> {
             recent_success_rate: mean(successes as f64),
             recent_steps: mean(steps as f64),
             metrics: if self.state.iterations > 0 { &self.report.metrics } else { &[] },
+            max_env_steps: Some(self.settings.max_env_steps),
             ..Progress::new(&self.state.actor, self.state.env_steps)
         }
     }

@@ -101,6 +101,7 @@ impl Learner for PpoLearner {
             }
             let mut progress = run.progress();
             progress.evaluation = found;
+            progress.stop = Some(self.budget.stop);
             let asked = observer(&progress).is_break();
             if reached || asked {
                 break if reached { StopReason::Rule } else { StopReason::Observer };
