@@ -38,6 +38,8 @@ fn quick() -> Method {
     let mut method = Method::fast().with_episodes(100, 100, 100);
     method.learner = Arc::new(selection);
     method.repair.rounds = 0;
+    // The direct way uses no option.
+    method.search.direct = false;
     method
 }
 

@@ -99,10 +99,17 @@ fn yes_or_no(yes: bool) -> String {
     if yes { "yes" } else { "no" }.to_owned()
 }
 
-/// The tenth at or below everything that is shown: what is near 1 can be told apart.
+/// The axes begin here if everything that is shown lies above.
+const NEAR_ONE: f64 = 0.98;
+
+/// [`NEAR_ONE`], or the tenth at or below everything that is shown: what is near 1 can be told apart.
 fn lowest(points: &[CalibrationPoint<'_>]) -> f64 {
-    let low = points.iter().map(|point| point.measured.lower95().min(point.predicted)).fold(0.9, f64::min);
-    ((low * 10.0).floor() / 10.0).clamp(0.0, 0.9)
+    let low = points.iter().map(|point| point.measured.lower95().min(point.predicted)).fold(1.0, f64::min);
+    if low >= NEAR_ONE { NEAR_ONE } else { ((low * 10.0).floor() / 10.0).clamp(0.0, 0.9) }
+}
+
+fn tick(share: f64) -> String {
+    if share.mul_add(100.0, 1e-9).fract() < 1e-6 { percent(share) } else { format!("{:.1} %", 100.0 * share) }
 }
 
 fn row(line: &ResultLine) -> Vec<String> {
@@ -128,8 +135,8 @@ fn panel(points: &[CalibrationPoint<'_>], low: f64) -> Panel {
     let up = Axis::new([low, 1.0]).between([bottom, top]).label("measured success");
     let mut panel = Panel::new(points[0].robot.to_owned(), HEIGHT);
     let chart = &mut panel.chart;
-    across.draw(chart, [top, bottom], percent);
-    up.draw_upright(chart, [left, right], percent);
+    across.draw(chart, [top, bottom], tick);
+    up.draw_upright(chart, [left, right], tick);
     chart.line([left, bottom], [right, top], Color::SOFT, 1.0);
     for CalibrationPoint { options, predicted, measured, .. } in points {
         let (x, style) = (across.at(*predicted), Style::of(options));
@@ -174,6 +181,7 @@ mod tests {
     fn the_axes_show_every_interval() {
         let wrong = ResultLine { successes: 10, ..ResultLine::example("a", "limo", "centroid", 2) };
         assert!(lowest(&points(&[&wrong])) <= wrong.tally().lower95());
-        assert_eq!(lowest(&[]), 0.9, "nothing to show");
+        assert_eq!(lowest(&[]), NEAR_ONE, "nothing to show");
+        assert_eq!([0.98, 0.985, 1.0].map(tick), ["98 %", "98.5 %", "100 %"]);
     }
 }
