@@ -654,7 +654,7 @@ pub(crate) struct Baseline {
     #[arg(long, value_enum, default_value_t = Collisions::End)]
     pub(crate) collisions: Collisions,
     /// Stop learning, or give up driving, after so many seconds of wall time [default: 2400]. Executions that came to
-    /// an end are counted; if that are not all, the exit code is 1.
+    /// an end are counted; if those are not all, the exit code is 1.
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) time_limit: Option<f64>,
     /// Samples of one plan of rrt; a plan that takes more has failed.

@@ -19,7 +19,8 @@ fuzz_target!(|bytes: &[u8]| {
         Ok(map) => {
             let saved = folder().join("saved/again.yaml");
             if save_ros(&map.grid, &saved).is_ok() {
-                let again = load(saved.to_str().expect("UTF-8"), &LoadOptions::default()).expect("just saved");
+                let again =
+                    load(saved.to_str().expect("UTF-8"), &LoadOptions::default()).expect("just saved");
                 assert_eq!(again.grid.cells(), map.grid.cells(), "saved and loaded");
             }
         }
