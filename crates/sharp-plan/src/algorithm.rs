@@ -207,7 +207,7 @@ fn algorithm_1(
         }
         let is_new = |other: &(f64, Vec<Arc<GuidedOption>>)| !measured.contains(&names(&other.1));
         other = cheapest(problem, &mut search, policies).filter(is_new);
-        if other.is_none() && !is_composed {
+        if other.is_none() {
             other = search.direct(&|id| policies.estimate(id), problem.monitor).filter(is_new);
         }
         if other.as_ref().is_none_or(|(other_s, _)| best_s <= method.retry_above * other_s) {
